@@ -1,0 +1,327 @@
+"""The binding to the daemon: one thread that owns the sockets, connects, and connects again."""
+
+import logging
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from enum import Enum
+from typing import Any, Protocol, TypeVar
+
+import zmq
+from google.protobuf.descriptor import ServiceDescriptor
+from posed.binder.connection import Connection
+from posed.binder.interface import interface_of
+from posed.binder.proxy import Proxy
+from posed.binder.runtime import control_path, runtime_directory
+from posed.binder.sockets import Context, Socket, context
+from posed.binder.status import DeadObjectError, TransactionTimeoutError
+from posed.binder.stub import Caller, Stub
+from posed.client.launcher import ensure_daemon
+from posed.errors import InvalidStateError, PosedError, ServiceUnavailableError
+from posed.proto import binder_pb2, service_manager_pb2
+
+_log = logging.getLogger(__name__)
+_T = TypeVar("_T")
+
+_CALL_TIMEOUT_S = 2.0
+_CLOSE_TIMEOUT_S = 1.0
+_FAREWELL_TIMEOUT_S = 0.3
+# A daemon that answers no call is tried again after this; one that keeps crashing is not started in a tight loop.
+_RETRY_S = 1.0
+_RESTART_INTERVAL_S = 2.0
+
+
+class ServiceState(Enum):
+    """Where a binding stands (android.content.ServiceConnection)."""
+
+    CONNECTING = "connecting"
+    """No daemon has answered yet."""
+    CONNECTED = "connected"
+    DISCONNECTED = "disconnected"
+    """The daemon crashed or was killed; the binding stays and connects again by itself."""
+    BINDING_DIED = "binding died"
+    """The daemon ended on purpose or refused this client; it connects again when one comes that accepts it."""
+    CLOSED = "closed"
+
+
+class Binding(Protocol):
+    """What a client does on its connection; every method is called on the service thread."""
+
+    def bind(self, service: "Service") -> None:
+        """Register with the daemon just connected."""
+
+    def unbind(self, service: "Service") -> None:
+        """Undo `bind` towards a daemon that is still there."""
+
+    def release(self, service: "Service") -> None:
+        """Close what `bind` opened on this side; the daemon may be gone."""
+
+
+class Service:
+    """One client's binding to the daemon, kept by a thread of its own until `close`."""
+
+    def __init__(
+        self,
+        binding: Binding,
+        *,
+        auto_create: bool,
+        on_service_connected: Callable[[], None] | None = None,
+        on_service_disconnected: Callable[[], None] | None = None,
+        on_binding_died: Callable[[str], None] | None = None,
+    ) -> None:
+        self._binding = binding
+        self._auto_create = auto_create
+        self._on_connected = on_service_connected
+        self._on_disconnected = on_service_disconnected
+        self._on_died = on_binding_died
+        self._changed = threading.Condition()
+        self._state = ServiceState.CONNECTING
+        self.reason = "no daemon has answered yet; start one with `posed serve` or bind with auto_create=True"
+        """Why the binding is not connected, for people."""
+        self._requests: deque[tuple[Callable[[], Any], Future[Any]]] = deque()
+        self._links: list[bool] = []
+        self._farewell: str | None = None
+        self._retry_at: float | None = None
+        self._started_at = float("-inf")
+        self._extra: dict[Socket, Callable[[], None]] = {}
+        self.context: Context = context()
+        self.directory = runtime_directory()
+        self._wake_fd = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        self._thread = threading.Thread(target=self._run, name="posed-client", daemon=True)
+        self._thread.start()
+
+    # From any thread
+
+    @property
+    def state(self) -> ServiceState:
+        """Where the binding stands now."""
+        return self._state
+
+    def wait_connected(self, timeout_s: float) -> None:
+        """Wait until a daemon is connected; raises ServiceUnavailableError with the reason after `timeout_s`."""
+        with self._changed:
+            done = (ServiceState.CONNECTED, ServiceState.CLOSED)
+            self._changed.wait_for(lambda: self._state in done, timeout_s)
+            if self._state is not ServiceState.CONNECTED:
+                raise ServiceUnavailableError(f"posed is {self._state.value}: {self.reason}")
+
+    def run(self, action: Callable[[], _T], timeout_s: float = 2 * _CALL_TIMEOUT_S) -> _T:
+        """Run `action` on the service thread, once connected, and return what it returns or raise what it raises.
+
+        Raises ServiceUnavailableError if no daemon is connected in time.
+        """
+        if threading.current_thread() is self._thread:
+            return action()
+        self.wait_connected(timeout_s)
+        future: Future[_T] = Future()
+        self._requests.append((action, future))
+        self._wake()
+        try:
+            return future.result(timeout_s)
+        except TimeoutError:
+            raise ServiceUnavailableError(f"the daemon did not answer within {timeout_s:g} s") from None
+
+    def close(self) -> None:
+        """Unbind and stop the thread; a second call does nothing. Takes a second at most, whatever the daemon does."""
+        with self._changed:
+            if self._state is ServiceState.CLOSED:
+                return
+            self._set_state(ServiceState.CLOSED, "the client was closed")
+        self._wake()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(_CLOSE_TIMEOUT_S)
+
+    # From the service thread
+
+    @property
+    def connection(self) -> Connection:
+        """The connection to the daemon."""
+        return self._connection
+
+    def get_service(self, name: str, descriptor: ServiceDescriptor) -> tuple[Proxy, bytes]:
+        """Return a service of the daemon and the daemon's boot id, its version checked."""
+        request = service_manager_pb2.GetServiceRequest(name=name, interface=interface_of(descriptor).info)
+        info = self._manager().getService(request)
+        return self._connection.proxy(descriptor, name, _CALL_TIMEOUT_S), info.boot_id
+
+    def watch(self, socket: Socket, on_readable: Callable[[], None]) -> None:
+        """Have `on_readable` called on the service thread when the socket can be read."""
+        self._extra[socket] = on_readable
+        self._poller.register(socket, zmq.POLLIN)
+
+    def unwatch(self, socket: Socket) -> None:
+        """Undo `watch` and close the socket."""
+        if self._extra.pop(socket, None) is not None:
+            self._poller.unregister(socket)
+        socket.close()
+
+    # Private
+
+    def _wake(self) -> None:
+        try:
+            os.eventfd_write(self._wake_fd, 1)
+        except OSError:
+            if self._thread.is_alive():
+                raise
+
+    def _set_state(self, state: ServiceState, reason: str) -> None:
+        with self._changed:
+            if self._state is not ServiceState.CLOSED:
+                self._state = state
+                self.reason = reason
+                self._changed.notify_all()
+
+    def _manager(self, timeout_s: float = _CALL_TIMEOUT_S) -> Proxy:
+        return self._connection.proxy(_MANAGER, "servicemanager", timeout_s)
+
+    def _run(self) -> None:
+        self._connection = Connection(control_path(self.directory), self.context)
+        self._connection.on_connected = lambda: self._links.append(True)
+        self._connection.on_disconnected = lambda: self._links.append(False)
+        self._connection.add_callback("connection", _ServiceConnection(self))
+        self._poller = zmq.Poller()
+        for socket in self._connection.sockets:
+            self._poller.register(socket, zmq.POLLIN)
+        self._poller.register(self._wake_fd, zmq.POLLIN)
+        if self._auto_create:
+            self._start_daemon()
+        try:
+            while self._state is not ServiceState.CLOSED:
+                self._turn()
+            self._leave()
+        finally:
+            self._binding.release(self)
+            self._connection.close()
+            self._fail_requests()
+            self.context.destroy(linger=0)
+            os.close(self._wake_fd)
+
+    def _turn(self) -> None:
+        """Take in what happened, then wait for more."""
+        more = self._connection.process()
+        while self._links:
+            more = True
+            if self._links.pop(0):
+                self._connected()
+            else:
+                self._disconnected()
+        while self._requests and self._state is ServiceState.CONNECTED:
+            more = True
+            self._serve(*self._requests.popleft())
+        if self._retry_at is not None and time.monotonic() >= self._retry_at:
+            self._retry_at = None
+            self._try_again()
+        # A call that waited for its reply has read the sockets: what came besides is only seen by the next process.
+        ready = dict(self._poller.poll(0 if more else self._timeout_ms()))
+        if self._wake_fd in ready:
+            os.eventfd_read(self._wake_fd)
+        for socket, on_readable in list(self._extra.items()):
+            if socket in ready:
+                on_readable()
+
+    def _try_again(self) -> None:
+        if self._connection.connected:
+            self._connected()
+        elif self._auto_create:
+            self._start_daemon()
+
+    def _timeout_ms(self) -> int | None:
+        if self._retry_at is None:
+            return None
+        return max(0, int((self._retry_at - time.monotonic()) * 1000) + 1)
+
+    def _serve(self, action: Callable[[], Any], future: "Future[Any]") -> None:
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            future.set_result(action())
+        except BaseException as error:
+            future.set_exception(error)
+
+    def _connected(self) -> None:
+        self._farewell = None
+        try:
+            self._manager().bindService(
+                service_manager_pb2.BindRequest(auto_create=self._auto_create, connection="connection")
+            )
+            self._binding.bind(self)
+        except DeadObjectError:
+            return  # the monitor reports it, and then what follows from it
+        except TransactionTimeoutError as error:
+            self._set_state(ServiceState.DISCONNECTED, str(error))
+            self._retry_at = time.monotonic() + _RETRY_S
+            return
+        except PosedError as error:
+            self._binding.release(self)
+            self._set_state(ServiceState.BINDING_DIED, str(error))
+            self._call_back(self._on_died, str(error))
+            return
+        self._set_state(ServiceState.CONNECTED, "")
+        self._call_back(self._on_connected)
+
+    def _disconnected(self) -> None:
+        self._binding.release(self)
+        was = self._state
+        if self._farewell is not None:
+            self._set_state(ServiceState.BINDING_DIED, self._farewell)
+            self._call_back(self._on_died, self._farewell)
+        elif was is not ServiceState.BINDING_DIED:
+            self._set_state(ServiceState.DISCONNECTED, "the daemon went away without a word; waiting for its return")
+            if was is ServiceState.CONNECTED:
+                self._call_back(self._on_disconnected)
+            if self._auto_create:
+                self._start_daemon()
+
+    def _start_daemon(self) -> None:
+        wait_s = self._started_at + _RESTART_INTERVAL_S - time.monotonic()
+        if wait_s > 0:
+            self._retry_at = time.monotonic() + wait_s
+            return
+        self._started_at = time.monotonic()
+        try:
+            ensure_daemon()
+        except (PosedError, OSError) as error:
+            self._set_state(ServiceState.BINDING_DIED, str(error))
+            self._call_back(self._on_died, str(error))
+
+    def _leave(self) -> None:
+        """Tell a daemon that is there that this client goes; one that is not there knows already."""
+        if not self._connection.connected:
+            return
+        try:
+            self._binding.unbind(self)
+            self._manager(_FAREWELL_TIMEOUT_S).unbindService(binder_pb2.Empty())
+        except PosedError as error:
+            _log.debug("leaving without a farewell: %s", error)
+
+    def _fail_requests(self) -> None:
+        while self._requests:
+            self._requests.popleft()[1].set_exception(InvalidStateError("the client was closed"))
+
+    def _call_back(self, callback: Callable[..., None] | None, *arguments: Any) -> None:
+        if callback is not None:
+            call_back(callback, *arguments)
+
+
+def call_back(callback: Callable[..., None], *arguments: Any) -> None:
+    """Call the user's code; what it raises is logged with its name and harms nothing else."""
+    try:
+        callback(*arguments)
+    except Exception:
+        _log.exception("callback %s failed", getattr(callback, "__qualname__", callback))
+
+
+class _ServiceConnection(Stub):
+    descriptor = service_manager_pb2.DESCRIPTOR.services_by_name["IServiceConnection"]
+
+    def __init__(self, service: Service) -> None:
+        self._service = service
+
+    def onBindingDied(self, request: service_manager_pb2.BindingDied, caller: Caller) -> None:
+        self._service._farewell = request.reason
+
+
+_MANAGER = service_manager_pb2.DESCRIPTOR.services_by_name["IServiceManager"]

@@ -1,0 +1,1 @@
+"""Android's Binder over ZeroMQ: stubs and proxies made from protobuf services, death links, caller identity."""

@@ -1,0 +1,158 @@
+"""The daemon's one loop in one thread: poll until the next deadline, drain, fuse, deliver, publish."""
+
+import contextlib
+import logging
+import os
+import signal
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+import zmq
+from posed.binder.runtime import InstanceLock, control_path, pose_path, runtime_directory
+from posed.binder.server import Server
+from posed.binder.sockets import context
+from posed.binder.stub import Stub
+from posed.clock import BootClock, Clock
+from posed.daemon.config import DaemonConfig
+from posed.daemon.encoding import delivery_header
+from posed.daemon.lifecycle import Lifecycle
+from posed.daemon.manager_stub import ServiceManagerStub
+from posed.daemon.notify import sd_notify
+from posed.daemon.pose_stub import PoseServiceStub
+from posed.daemon.publisher import PosePublisher
+from posed.daemon.sensor_stub import SensorServiceStub
+from posed.daemon.statistics import PublicationStatistics
+from posed.fusion import make_filter
+from posed.fusion.filter import SensorNoise
+from posed.hal import open_source
+from posed.hal.profile import load_profile
+from posed.proto import events_pb2
+from posed.sensors import SensorService
+
+_log = logging.getLogger(__name__)
+
+# A client that had the daemon started binds within milliseconds of its readiness; one that died meanwhile never does.
+_FIRST_BIND_WAIT_NS = 10_000_000_000
+
+
+def run(config: DaemonConfig) -> None:
+    """Serve until told to stop (SIGTERM, SIGINT, stopService, the last unbind).
+
+    Raises AlreadyRunningError if another daemon of this user runs, and any PosedError that the source, the profile or
+    the runtime directory gives rise to.
+    """
+    directory = runtime_directory()
+    lock = InstanceLock(directory)
+    lock.acquire()
+    try:
+        daemon = _Daemon(config, BootClock(), directory)
+        try:
+            daemon.serve()
+        finally:
+            daemon.close()
+    finally:
+        lock.release()
+
+
+class _Daemon:
+    def __init__(self, config: DaemonConfig, clock: Clock, directory: Path) -> None:
+        self._clock = clock
+        self._boot_id = os.urandom(16)
+        self._lifecycle = Lifecycle(config.started)
+        self._signal: int | None = None
+        profile = load_profile(config.profile)
+        self._source = open_source(
+            config.source, profile, clock, seed=config.seed, speed=config.speed, loop=config.loop
+        )
+        noise = profile.noise
+        orientation_filter = make_filter(
+            config.filter, SensorNoise(noise.gyroscope_density, noise.accelerometer_std, noise.magnetic_field_std)
+        )
+        self._service = SensorService(self._source, orientation_filter, clock, config.position)
+        self._context = context()
+        self._server = Server(control_path(directory), self._context)
+        statistics = PublicationStatistics()
+        self._publisher = PosePublisher(
+            pose_path(directory), self._context, self._boot_id, clock, self._source, statistics
+        )
+        self._sensors = SensorServiceStub(self._service, clock, statistics, lambda: self._server.parcels_refused)
+        services: dict[str, Stub] = {
+            "sensorservice": self._sensors,
+            "poseservice": PoseServiceStub(self._service, config.filter),
+        }
+        self._manager = ServiceManagerStub(services, self._server.peers, self._lifecycle, clock, self._boot_id, config)
+        for name, stub in {"servicemanager": self._manager, **services}.items():
+            self._server.add_service(name, stub)
+
+    def serve(self) -> None:
+        """Run until the life cycle or a signal ends it."""
+        poller = zmq.Poller()
+        for input_socket in (*self._server.sockets, self._publisher.socket):
+            poller.register(input_socket, zmq.POLLIN)
+        wait_for_bind_ns = self._clock.now_ns() + _FIRST_BIND_WAIT_NS
+        with _signals(self._on_signal) as signal_fd:
+            poller.register(signal_fd, zmq.POLLIN)
+            sd_notify("READY=1")
+            _log.info("ready: %s", self._describe())
+            while self._signal is None and not self._lifecycle.over:
+                more = self._server.process()
+                self._publisher.read_subscriptions()
+                self._service.advance()
+                self._publisher.publish(self._service.take_poses())
+                self._sensors.deliver(self._header)
+                now_ns = self._clock.now_ns()
+                deadlines = [self._service.next_deadline_ns()]
+                if self._lifecycle.awaits_first_bind:
+                    if now_ns >= wait_for_bind_ns:
+                        break
+                    deadlines.append(wait_for_bind_ns)
+                if self._server.retry_s is not None:
+                    deadlines.append(now_ns + int(self._server.retry_s * 1e9))
+                poller.poll(0 if more else _timeout_ms(deadlines, now_ns))
+        reason = "it was told to stop" if self._signal is None else f"it got {signal.Signals(self._signal).name}"
+        _log.info("stopping: %s", reason)
+        sd_notify("STOPPING=1")
+        self._manager.announce_end(f"the daemon ended because {reason}")
+
+    def close(self) -> None:
+        """Close the sockets; what was queued gets a moment to leave."""
+        self._publisher.close()
+        self._server.close()
+        self._context.term()
+
+    def _on_signal(self, number: int) -> None:
+        self._signal = number
+
+    def _header(self, sequence: int) -> events_pb2.DeliveryHeader:
+        return delivery_header(self._boot_id, sequence, self._clock.now_ns(), self._source.time_map)
+
+    def _describe(self) -> str:
+        return ", ".join(sensor.name for sensor in self._source.sensors)
+
+
+@contextlib.contextmanager
+def _signals(on_signal: Callable[[int], None]) -> Iterator[int]:
+    """Have SIGTERM and SIGINT noted and a file descriptor made readable by them, so that a poll wakes up."""
+    reader, writer = socket.socketpair()
+    for end in (reader, writer):
+        end.setblocking(False)
+    handlers = {
+        number: signal.signal(number, lambda number, _frame: on_signal(number))
+        for number in (signal.SIGTERM, signal.SIGINT)
+    }
+    previous = signal.set_wakeup_fd(writer.fileno())
+    try:
+        yield reader.fileno()
+    finally:
+        signal.set_wakeup_fd(previous)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        reader.close()
+        writer.close()
+
+
+def _timeout_ms(deadlines_ns: Iterable[int | None], now_ns: int) -> int | None:
+    """Return the time to the earliest deadline, rounded up: a poll of 0.4 ms cut to 0 would spin."""
+    due = [deadline for deadline in deadlines_ns if deadline is not None]
+    return max(0, -(-(min(due) - now_ns) // 1_000_000)) if due else None

@@ -1,0 +1,247 @@
+"""What moves through the service: sensors, batches of their events, poses and truth."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import IntEnum, IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+Int64Array = npt.NDArray[np.int64]
+Float64Array = npt.NDArray[np.float64]
+
+
+class SensorType(IntEnum):
+    """Android's sensor types (hardware/sensors-base.h) that posed offers."""
+
+    ACCELEROMETER = 1
+    MAGNETIC_FIELD = 2
+    GYROSCOPE = 4
+    GRAVITY = 9
+    LINEAR_ACCELERATION = 10
+    ROTATION_VECTOR = 11
+    MAGNETIC_FIELD_UNCALIBRATED = 14
+    GYROSCOPE_UNCALIBRATED = 16
+    ACCELEROMETER_UNCALIBRATED = 35
+
+    @property
+    def string_type(self) -> str:
+        """Android's string type, such as `android.sensor.accelerometer`."""
+        return f"android.sensor.{self.name.lower()}"
+
+
+class ReportingMode(IntEnum):
+    """Android's reporting modes."""
+
+    CONTINUOUS = 0
+    ON_CHANGE = 1
+    ONE_SHOT = 2
+    SPECIAL_TRIGGER = 3
+
+
+class RateMode(IntEnum):
+    """Android's SENSOR_DELAY codes; CUSTOM is a period that is none of the four."""
+
+    FASTEST = 0
+    GAME = 1
+    UI = 2
+    NORMAL = 3
+    CUSTOM = 4
+
+    @property
+    def sampling_period_us(self) -> int:
+        """The period Android sends for the code, in microseconds (CUSTOM has none and raises KeyError)."""
+        return _MODE_PERIOD_US[self]
+
+    @classmethod
+    def of_period(cls, sampling_period_us: int) -> "RateMode":
+        """Return the mode that asks for this period (us), CUSTOM if none does."""
+        for mode, period_us in _MODE_PERIOD_US.items():
+            if period_us == sampling_period_us:
+                return mode
+        return cls.CUSTOM
+
+
+_MODE_PERIOD_US = {RateMode.FASTEST: 0, RateMode.GAME: 20_000, RateMode.UI: 66_667, RateMode.NORMAL: 200_000}
+
+
+@dataclass(frozen=True, slots=True)
+class SensorInfo:
+    """One sensor as Android's `Sensor` describes it; ranges and resolution in the sensor's own unit."""
+
+    handle: int
+    type: SensorType
+    name: str
+    vendor: str
+    version: int
+    max_range: float
+    resolution: float
+    power_ma: float
+    min_delay_us: int
+    max_delay_us: int
+    fifo_reserved_event_count: int = 0
+    fifo_max_event_count: int = 0
+    reporting_mode: ReportingMode = ReportingMode.CONTINUOUS
+    wake_up: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class EventColumn:
+    """The events of one sensor, oldest first.
+
+    timestamp_ns: int64[n], sample time. values: float64[n, w], the sensor's unit. accuracy: int8[n], Android's
+    SENSOR_STATUS.
+    """
+
+    timestamp_ns: Int64Array
+    values: Float64Array
+    accuracy: npt.NDArray[np.int8]
+
+    def __len__(self) -> int:
+        return len(self.timestamp_ns)
+
+    def __getitem__(self, rows: slice) -> "EventColumn":
+        return EventColumn(self.timestamp_ns[rows], self.values[rows], self.accuracy[rows])
+
+    @staticmethod
+    def concatenate(parts: "Sequence[EventColumn]") -> "EventColumn":
+        """Join columns of one sensor, given in time order."""
+        if len(parts) == 1:
+            return parts[0]
+        return EventColumn(
+            np.concatenate([part.timestamp_ns for part in parts]),
+            np.concatenate([part.values for part in parts]),
+            np.concatenate([part.accuracy for part in parts]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FlatEvents:
+    """Three-axis events of several sensors in one time order, as the filters walk them.
+
+    sensor_type: int64[n]; timestamp_ns: int64[n]; values: float64[n, 3].
+    """
+
+    sensor_type: Int64Array
+    timestamp_ns: Int64Array
+    values: Float64Array
+
+    def __len__(self) -> int:
+        return len(self.timestamp_ns)
+
+    def __getitem__(self, rows: slice) -> "FlatEvents":
+        return FlatEvents(self.sensor_type[rows], self.timestamp_ns[rows], self.values[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class EventBatch:
+    """What one drain of a source yields: a column a sensor handle, and the flushes completed behind them."""
+
+    columns: Mapping[int, EventColumn] = field(default_factory=dict)
+    flush_completes: Sequence[int] = ()
+    """Handles whose flush completed, in the order asked; each stands behind every event of its handle here."""
+
+    def __len__(self) -> int:
+        return sum(len(column) for column in self.columns.values())
+
+    def flat(self, sensor_types: Mapping[int, SensorType]) -> FlatEvents:
+        """Return the events of the handles in `sensor_types` in one order: by time, ties by handle.
+
+        Only the first three values of an event are kept.
+        """
+        chosen = [handle for handle in sorted(sensor_types) if len(self.columns.get(handle, ()))]
+        if not chosen:
+            return _NO_EVENTS
+        columns = [self.columns[handle] for handle in chosen]
+        types = np.repeat(np.array([sensor_types[h] for h in chosen], np.int64), [len(c) for c in columns])
+        times = np.concatenate([c.timestamp_ns for c in columns])
+        values = np.concatenate([c.values[:, :3] for c in columns])
+        order = np.argsort(times, kind="stable")
+        return FlatEvents(types[order], times[order], values[order])
+
+
+_NO_EVENTS = FlatEvents(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)))
+
+
+class FilterStatus(IntFlag):
+    """What a filter knows about the worth of its orientation."""
+
+    OK = 0
+    INITIALISING = 1
+    """Gravity or north has not been seen yet (or not since a gap)."""
+    AT_REST = 2
+    MAGNETIC_DISTURBANCE = 4
+    """The magnetometer is being rejected; heading runs on the gyroscope."""
+    GYRO_LOST = 8
+    """No gyroscope sample for 0.5 s; accelerometer and magnetometer alone."""
+    FREE_FALL = 16
+    """The last accelerometer sample was below 1 m/s2 and not used."""
+    GAP = 32
+    """A time gap was bridged or a sample was out of order since the last pose."""
+    BAD_SAMPLE = 64
+    """A NaN, infinite or degenerate sample was rejected since the last pose."""
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """A filter's answer at one instant.
+
+    quaternion: (x, y, z, w), device to world (ENU, magnetic north), w >= 0. angular_rate: rad/s, device frame, bias
+    removed. heading_accuracy: rad, one standard deviation.
+    """
+
+    timestamp_ns: int
+    quaternion: tuple[float, float, float, float]
+    angular_rate: tuple[float, float, float]
+    heading_accuracy: float
+    status: FilterStatus
+
+    def with_status(self, status: FilterStatus) -> "Orientation":
+        """Return the same orientation under another status."""
+        return replace(self, status=status)
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """Where the phone is: degrees (WGS 84), metres above the ellipsoid, ENU covariance (m2, row-major, 9 values)."""
+
+    latitude_deg: float
+    longitude_deg: float
+    height_m: float
+    covariance_enu: tuple[float, ...] = (0.0,) * 9
+    velocity_enu: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    source: str = "fixed"
+    timestamp_ns: int | None = None
+    """Sample time of the fix; None for a position that was stated and does not age."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """The fused pose of one grid instant, all in sample time.
+
+    sequence: index of the grid instant since the first sample. instant_ns: the grid instant. orientation.timestamp_ns:
+    newest gyroscope sample fused.
+    """
+
+    sequence: int
+    instant_ns: int
+    period_us: int
+    orientation: Orientation
+    filter_name: str
+    rate_mode: RateMode
+    events_fused: int
+    position: Position | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where the phone really points: quaternion (x, y, z, w), device to world ENU, **true** north.
+
+    declination: rad, east positive; magnetic heading = true heading - declination.
+    position_enu: metres from where the motion began, None where unknown.
+    """
+
+    timestamp_ns: int
+    quaternion: tuple[float, float, float, float]
+    declination: float
+    position_enu: tuple[float, float, float] | None = None

@@ -1,0 +1,272 @@
+"""Device profiles: what a phone's parts can do, read from TOML, and the rates they answer a request with."""
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from posed.errors import InvalidArgumentError, ProfileError
+from posed.events import SensorInfo, SensorType
+from posed.hal.calibration import Calibration
+from posed.hal.toml_table import TomlTable, close_match
+
+UNCALIBRATED_TYPE: Mapping[SensorType, SensorType] = {
+    SensorType.ACCELEROMETER: SensorType.ACCELEROMETER_UNCALIBRATED,
+    SensorType.MAGNETIC_FIELD: SensorType.MAGNETIC_FIELD_UNCALIBRATED,
+    SensorType.GYROSCOPE: SensorType.GYROSCOPE_UNCALIBRATED,
+}
+"""The three parts of a phone, each with the type of its uncalibrated stream."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualErrors:
+    """How far a calibrated sensor may still be off: bounds of constant errors, drawn once a simulated phone.
+
+    bias: the sensor's unit, each axis. scale: fraction of the reading. misalignment: rad. hard_iron: uT, each axis.
+    soft_iron: fraction of the field. The last two belong to a magnetometer, the first three to the others.
+    """
+
+    bias: float = 0.0
+    scale: float = 0.0
+    misalignment: float = 0.0
+    hard_iron: float = 0.0
+    soft_iron: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SensorProfile:
+    """One part of a phone. Range, resolution and errors in the sensor's own unit (m/s2, rad/s, uT)."""
+
+    type: SensorType
+    name: str
+    vendor: str
+    version: int
+    max_range: float
+    resolution: float
+    power_ma: float
+    rates_hz: tuple[float, ...]
+    """The output rates the part has, ascending."""
+    noise_density: float
+    """White noise, unit/sqrt(Hz): the standard deviation of a sample is this times sqrt(rate)."""
+    bias_walk: float = 0.0
+    """Random walk of the bias, unit/sqrt(s): its standard deviation after t seconds is this times sqrt(t)."""
+    timestamp_jitter_s: float = 0.0
+    """Standard deviation of a timestamp about its even spacing, seconds."""
+    fifo_reserved: int = 0
+    fifo_max: int = 0
+    residual: ResidualErrors = ResidualErrors()
+
+    def configured_rate_hz(self, sampling_period_ns: int) -> float:
+        """Return the slowest rate (Hz) that is not slower than the period asked for, else the fastest there is.
+
+        Raises InvalidArgumentError for a negative period; 0 asks for the fastest.
+        """
+        if sampling_period_ns < 0:
+            raise InvalidArgumentError(f"sampling_period_ns = {sampling_period_ns}; allowed: 0 (fastest) or more")
+        for rate in self.rates_hz:
+            if exact_period_ns(rate) <= sampling_period_ns:
+                return rate
+        return self.rates_hz[-1]
+
+    def configured_period_ns(self, sampling_period_ns: int) -> int:
+        """Return the period (ns) of `configured_rate_hz`, rounded up so that asking for it again gives the same rate.
+
+        Raises InvalidArgumentError for a negative period.
+        """
+        return math.ceil(exact_period_ns(self.configured_rate_hz(sampling_period_ns)))
+
+    def sample_std(self, rate_hz: float) -> float:
+        """Return the standard deviation of one sample at `rate_hz`, white noise and quantisation, sensor's unit."""
+        return math.hypot(self.noise_density * math.sqrt(rate_hz), self.resolution / math.sqrt(12.0))
+
+    @property
+    def min_delay_us(self) -> int:
+        """The period of the fastest rate in whole microseconds, rounded down."""
+        return math.floor(exact_period_ns(self.rates_hz[-1]) / 1000)
+
+    @property
+    def max_delay_us(self) -> int:
+        """The period of the slowest rate in whole microseconds, rounded up: truncated, 15 Hz would turn into 50."""
+        return math.ceil(exact_period_ns(self.rates_hz[0]) / 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseFigures:
+    """The noise a filter should expect of a device.
+
+    gyroscope_density: rad/s/sqrt(Hz). accelerometer_std (m/s2), magnetic_field_std (uT): one sample at the fastest
+    rate, quantisation included.
+    """
+
+    gyroscope_density: float
+    accelerometer_std: float
+    magnetic_field_std: float
+
+
+@dataclass(frozen=True)
+class DeviceProfile:
+    """A phone: its parts by type (accelerometer, magnetic field, gyroscope), each with its calibration."""
+
+    name: str
+    description: str
+    sensors: Mapping[SensorType, SensorProfile]
+    calibration: Mapping[SensorType, Calibration]
+
+    def sensor_infos(self) -> tuple[SensorInfo, ...]:
+        """Return the sensors as Android lists them, in handle order: three parts, each also uncalibrated.
+
+        A sensor's handle is its type's number.
+        """
+        return self._infos
+
+    def sensor(self, handle: int) -> SensorProfile:
+        """Return the part behind a sensor handle, calibrated or not.
+
+        Raises InvalidArgumentError for an unknown handle.
+        """
+        found = self._by_handle.get(handle)
+        if found is None:
+            known = ", ".join(f"{info.handle} ({info.type.name.lower()})" for info in self._infos)
+            raise InvalidArgumentError(f"sensor handle {handle} is not of profile {self.name}; allowed: {known}")
+        return found
+
+    @property
+    def noise(self) -> NoiseFigures:
+        """The noise of the parts, as filters need it."""
+        accelerometer = self.sensors[SensorType.ACCELEROMETER]
+        magnetic_field = self.sensors[SensorType.MAGNETIC_FIELD]
+        return NoiseFigures(
+            gyroscope_density=self.sensors[SensorType.GYROSCOPE].noise_density,
+            accelerometer_std=accelerometer.sample_std(accelerometer.rates_hz[-1]),
+            magnetic_field_std=magnetic_field.sample_std(magnetic_field.rates_hz[-1]),
+        )
+
+    @cached_property
+    def _infos(self) -> tuple[SensorInfo, ...]:
+        infos = [_sensor_info(part, kind) for part in self.sensors.values() for kind in _kinds(part.type)]
+        return tuple(sorted(infos, key=lambda info: info.handle))
+
+    @cached_property
+    def _by_handle(self) -> dict[int, SensorProfile]:
+        return {int(kind): part for part in self.sensors.values() for kind in _kinds(part.type)}
+
+
+def exact_period_ns(rate_hz: float) -> Fraction:
+    """Return the exact period (ns) of a rate: 15 Hz is 200000000/3, so that a long run does not drift."""
+    return 1_000_000_000 / Fraction(str(rate_hz))
+
+
+def profile_names() -> tuple[str, ...]:
+    """Return the names of the profiles that are shipped, sorted."""
+    return tuple(sorted(file.name.removesuffix(".toml") for file in _SHIPPED.iterdir() if file.name.endswith(".toml")))
+
+
+def load_profile(name_or_path: str) -> DeviceProfile:
+    """Read a shipped profile by its name, or one's own by a path that ends in .toml.
+
+    Raises InvalidArgumentError for a name that is not shipped, ProfileError for a file that is missing or malformed.
+    """
+    if name_or_path.endswith(".toml"):
+        try:
+            return _parse(name_or_path, Path(name_or_path).read_bytes())
+        except OSError as error:
+            raise ProfileError(f"{name_or_path}: {error.strerror}; give the path of a readable profile") from error
+    if name_or_path not in profile_names():
+        hint = close_match(name_or_path, profile_names())
+        raise InvalidArgumentError(
+            f"profile {name_or_path!r} is not shipped; allowed: {', '.join(profile_names())}, or a path ending in"
+            f" .toml{hint}"
+        )
+    file = f"{name_or_path}.toml"
+    return _parse(file, _SHIPPED.joinpath(file).read_bytes())
+
+
+_SHIPPED = resources.files("posed.hal").joinpath("profiles")
+
+
+def _kinds(part: SensorType) -> tuple[SensorType, SensorType]:
+    return part, UNCALIBRATED_TYPE[part]
+
+
+def _sensor_info(part: SensorProfile, kind: SensorType) -> SensorInfo:
+    return SensorInfo(
+        handle=int(kind),
+        type=kind,
+        name=part.name if kind is part.type else f"{part.name} Uncalibrated",
+        vendor=part.vendor,
+        version=part.version,
+        max_range=part.max_range,
+        resolution=part.resolution,
+        power_ma=part.power_ma,
+        min_delay_us=part.min_delay_us,
+        max_delay_us=part.max_delay_us,
+        fifo_reserved_event_count=part.fifo_reserved,
+        fifo_max_event_count=part.fifo_max,
+    )
+
+
+def _parse(file: str, content: bytes) -> DeviceProfile:
+    try:
+        values = tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ProfileError(f"{file}: not TOML: {error}") from error
+    root = TomlTable(file, "", values)
+    name = root.text("name")
+    description = root.text("description")
+    sensors = {kind: _read_sensor(kind, root.table(kind.name.lower(), required=True)) for kind in UNCALIBRATED_TYPE}
+    tables = root.table("calibration")
+    calibration = {kind: _read_calibration(kind, tables.table(kind.name.lower())) for kind in UNCALIBRATED_TYPE}
+    tables.finish()
+    root.finish()
+    return DeviceProfile(name, description, sensors, calibration)
+
+
+def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:
+    residual = table.table("residual")
+    bounds = ("hard_iron", "soft_iron") if kind is SensorType.MAGNETIC_FIELD else ("bias", "scale", "misalignment")
+    sensor = SensorProfile(
+        type=kind,
+        name=table.text("name"),
+        vendor=table.text("vendor"),
+        version=table.integer("version", low=1, default=1),
+        max_range=table.number("max_range", positive=True),
+        resolution=table.number("resolution", positive=True),
+        power_ma=table.number("power_ma"),
+        rates_hz=table.ascending("rates_hz"),
+        noise_density=table.number("noise_density"),
+        bias_walk=table.number("bias_walk", default=0.0),
+        timestamp_jitter_s=table.number("timestamp_jitter_s", default=0.0),
+        fifo_reserved=table.integer("fifo_reserved", low=0, default=0),
+        fifo_max=table.integer("fifo_max", low=0, default=0),
+        residual=ResidualErrors(**{bound: residual.number(bound, default=0.0) for bound in bounds}),
+    )
+    residual.finish()
+    table.finish()
+    if sensor.fifo_reserved > sensor.fifo_max:
+        raise table.refusal("fifo_reserved", sensor.fifo_reserved, f"at most fifo_max, {sensor.fifo_max}")
+    if sensor.resolution > sensor.max_range:
+        raise table.refusal("resolution", sensor.resolution, f"at most max_range, {sensor.max_range}")
+    if sensor.rates_hz[-1] > _HIGHEST_RATE_HZ:
+        raise table.refusal("rates_hz", list(sensor.rates_hz), f"rates up to {_HIGHEST_RATE_HZ} Hz")
+    return sensor
+
+
+_HIGHEST_RATE_HZ = 1000
+"""Android's sensor service asks no sensor for a period below 1 ms (SensorDevice.cpp, MINIMUM_EVENTS_PERIOD)."""
+
+
+def _read_calibration(kind: SensorType, table: TomlTable) -> Calibration:
+    if kind is SensorType.MAGNETIC_FIELD:
+        calibration = Calibration(table.vector("hard_iron", np.zeros(3)), table.matrix("soft_iron"))
+    else:
+        scale = table.vector("scale", np.ones(3))
+        if not scale.all():
+            raise table.refusal("scale", scale.tolist(), "3 numbers, none of them 0")
+        calibration = Calibration(table.vector("bias", np.zeros(3)), table.matrix("misalignment") * scale)
+    table.finish()
+    return calibration

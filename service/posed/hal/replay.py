@@ -1,0 +1,273 @@
+"""A recorded walk as a source of samples: at its own pace, faster or slower, once or over and over."""
+
+from bisect import bisect_right
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from posed.clock import Clock, TimeMap
+from posed.errors import InvalidArgumentError, RecordingError
+from posed.events import EventBatch, EventColumn, SensorInfo, SensorType, Truth
+from posed.hal.attitude_trial import load_trial
+from posed.hal.csv_recording import load_csv
+from posed.hal.profile import UNCALIBRATED_TYPE, DeviceProfile, SensorProfile
+from posed.hal.recording import Recording, read_only
+from posed.hal.thinning import LONGEST_HOLD_NS, thin_by_mean, thin_by_nearest
+
+SLOWEST_SPEED = 0.1
+FASTEST_SPEED = 50.0
+LOOP_GAP_NS = LONGEST_HOLD_NS + 100_000_000
+"""Sample time between the end of a pass and the start of the next: long enough for filters to start afresh."""
+
+
+def load_recording(path: str | Path) -> Recording:
+    """Read a trial folder of the smartphone attitude data set, or FILE.csv.
+
+    Raises RecordingError if it is missing, malformed, or neither.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return load_trial(path)
+    if path.suffix == ".csv":
+        return load_csv(path)
+    found = "a file that does not end in .csv" if path.exists() else "missing"
+    raise RecordingError(f"recording {path} is {found}; name a FILE.csv or the folder of a smartphone attitude trial")
+
+
+def open_replay(
+    path: str | Path, profile: DeviceProfile, clock: Clock, *, speed: float = 1.0, loop: bool = False
+) -> "ReplaySource":
+    """Return a source that replays the recording at `path`.
+
+    Raises RecordingError for the recording, InvalidArgumentError for the speed.
+    """
+    return ReplaySource(load_recording(path), profile, clock, speed, loop)
+
+
+class ReplaySource:
+    """A SensorSource over a recording; sample time is the recording's own clock.
+
+    The first activation starts it: the recording's first sample then stands at the clock's now. With no sensor active
+    it pauses, and goes on from the same sample time. Each pass of a loop continues sample time behind a gap.
+
+    A rate below the recorded one is made of it by interval mean (gyroscope) or nearest sample (the others), on a grid
+    from the recording's start; any other rate gives what was recorded. Sensors are the profile's, as far as recorded.
+    A calibration in the profile was measured on raw readings, so the calibrated stream is made anew from the recorded
+    uncalibrated one, which is not touched; only where that is missing is the recorded calibrated stream corrected.
+    """
+
+    def __init__(
+        self, recording: Recording, profile: DeviceProfile, clock: Clock, speed: float = 1.0, loop: bool = False
+    ) -> None:
+        """Raise InvalidArgumentError unless 0.1 <= speed <= 50, RecordingError if no sensor is the profile's."""
+        if not SLOWEST_SPEED <= speed <= FASTEST_SPEED:
+            raise InvalidArgumentError(f"replay speed {speed}; allowed: {SLOWEST_SPEED} to {FASTEST_SPEED}")
+        self._recording = recording
+        self._clock = clock
+        self._loop = loop
+        self._streams: dict[int, _Stream] = {}
+        infos = []
+        for info in profile.sensor_infos():
+            column = _calibrated(recording, profile, info.type)
+            if column is not None and len(column):
+                infos.append(info)
+                self._streams[info.handle] = _Stream(info.type, column, profile.sensor(info.handle), recording.start_ns)
+        if not infos:
+            held = ", ".join(kind.name.lower() for kind in recording.columns)
+            raise RecordingError(
+                f"recording {recording.name!r} holds {held}; expected a sensor of profile {profile.name}"
+            )
+        self._infos = tuple(infos)
+        self._pass_ns = recording.end_ns - recording.start_ns + LOOP_GAP_NS
+        self._scale = 1.0 / speed
+        self._active: dict[int, _Stream] = {}
+        self._flushes: list[int] = []
+        self._untouched: set[int] = set()
+        """Sensors that have not been switched since the replay began to run, while nothing has been drained since."""
+        self._drained_ns = recording.start_ns - 1
+        self._time_map = self._standing_at(recording.start_ns)
+
+    @property
+    def sensors(self) -> tuple[SensorInfo, ...]:
+        """The profile's sensors that the recording has, in handle order."""
+        return self._infos
+
+    @property
+    def time_map(self) -> TimeMap:
+        """The mapping from sample time to CLOCK_BOOTTIME; while paused, that of the run before."""
+        return self._time_map
+
+    @property
+    def exhausted(self) -> bool:
+        """True once the last sample of a replay that does not loop has been drained."""
+        return not self._loop and self._drained_ns >= self._recording.end_ns
+
+    def activate(self, handle: int, enabled: bool) -> None:
+        """Switch a sensor on or off; the first on starts or resumes the replay, the last off pauses it.
+
+        Raises InvalidArgumentError for an unknown handle.
+        """
+        stream = self._stream(handle)
+        if enabled == (handle in self._active):
+            return
+        if enabled:
+            if not stream.is_configured:
+                stream.configure(0)
+            if not self._active:
+                self._time_map = self._standing_at(self._drained_ns + 1)
+                self._untouched = set(self._streams)
+            # Sensors switched on one after another, before anything was drained, all begin where the run began:
+            # what a replay yields then does not depend on how fast its user was.
+            stream.since_ns = self._drained_ns if handle in self._untouched else self._present_ns()
+            self._active[handle] = stream
+            return
+        self._untouched.discard(handle)
+        del self._active[handle]
+        self._flushes = [asked for asked in self._flushes if asked != handle]
+        if not self._active:
+            self._drained_ns = self._present_ns()
+
+    def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:
+        """Set a sensor's period from the last drained instant on and return the profile's period for it (ns).
+
+        Raises InvalidArgumentError for an unknown handle or a negative period.
+        """
+        return self._stream(handle).configure(sampling_period_ns)
+
+    def flush(self, handle: int) -> None:
+        """Ask for one flush-complete; raises InvalidArgumentError if the sensor is unknown or not active."""
+        self._stream(handle)
+        if handle not in self._active:
+            raise InvalidArgumentError(f"sensor handle {handle} is not active; activate it before flush")
+        self._flushes.append(handle)
+
+    def drain(self, until_ns: int) -> EventBatch:
+        """Return every sample of the active sensors later than the last drain and not later than `until_ns`."""
+        flushed, self._flushes = self._flushes, []
+        columns: dict[int, EventColumn] = {}
+        if self._active and until_ns > self._drained_ns:
+            for handle, stream in self._active.items():
+                column = self._between(stream, max(self._drained_ns, stream.since_ns), until_ns)
+                if len(column.timestamp_ns):
+                    columns[handle] = column
+            self._drained_ns = until_ns
+            self._untouched.clear()
+        return EventBatch(columns, flushed)
+
+    def next_sample_ns(self, handle: int) -> int | None:
+        """Return when the next sample of an active sensor is due, None if the sensor is off or the replay at its end.
+
+        Raises InvalidArgumentError for an unknown handle.
+        """
+        stream = self._stream(handle)
+        if handle not in self._active or not len(stream.times):
+            return None
+        after_ns = max(self._drained_ns, stream.since_ns)
+        shift_ns = self._shift_ns(after_ns)
+        row = bisect_right(stream.times, after_ns - shift_ns)
+        if row < len(stream.times):
+            return stream.times[row] + shift_ns
+        return stream.times[0] + shift_ns + self._pass_ns if self._loop else None
+
+    def truth(self, timestamp_ns: int) -> Truth | None:
+        """Return the measured orientation at `timestamp_ns`, None where none is known.
+
+        The first call reads it: raises RecordingError if it is malformed, MissingExtraError if scipy is not installed.
+        """
+        track = self._recording.truth
+        if track is None:
+            return None
+        shift_ns = self._shift_ns(timestamp_ns)
+        truth = track.at(timestamp_ns - shift_ns, self._recording.declination)
+        return replace(truth, timestamp_ns=timestamp_ns) if truth else None
+
+    def _stream(self, handle: int) -> "_Stream":
+        stream = self._streams.get(handle)
+        if stream is None:
+            known = ", ".join(f"{info.handle} ({info.type.name.lower()})" for info in self._infos)
+            raise InvalidArgumentError(f"sensor handle {handle} is not in this replay; allowed: {known}")
+        return stream
+
+    def _standing_at(self, sample_ns: int) -> TimeMap:
+        """Return the mapping by which `sample_ns` stands at the clock's now."""
+        now_ns = self._clock.now_ns()
+        return TimeMap(now_ns - TimeMap(0, self._scale).to_boot(sample_ns), self._scale)
+
+    def _present_ns(self) -> int:
+        """Return the sample time the replay has come to: by the clock, or further if it was drained ahead of it."""
+        return max(self._drained_ns, self._time_map.to_sample(self._clock.now_ns()))
+
+    def _shift_ns(self, sample_ns: int) -> int:
+        """Return what the pass of the loop that `sample_ns` falls into adds to the recording's own time."""
+        if not self._loop:
+            return 0
+        return max(0, (sample_ns - self._recording.start_ns) // self._pass_ns) * self._pass_ns
+
+    def _between(self, stream: "_Stream", after_ns: int, until_ns: int) -> EventColumn:
+        first_ns, last_ns = self._shift_ns(after_ns), self._shift_ns(until_ns)
+        if first_ns == last_ns:
+            return stream.rows(after_ns, until_ns, first_ns)
+        passes = [
+            stream.rows(max(after_ns, shift_ns + self._recording.start_ns - 1), until_ns, shift_ns)
+            for shift_ns in range(first_ns, last_ns + 1, self._pass_ns)
+        ]
+        return EventColumn(
+            np.concatenate([rows.timestamp_ns for rows in passes]),
+            np.concatenate([rows.values for rows in passes]),
+            np.concatenate([rows.accuracy for rows in passes]),
+        )
+
+
+class _Stream:
+    """One sensor's column at its present rate, cut by time without a copy."""
+
+    def __init__(self, kind: SensorType, recorded: EventColumn, part: SensorProfile, anchor_ns: int) -> None:
+        self._is_gyroscope = kind in (SensorType.GYROSCOPE, SensorType.GYROSCOPE_UNCALIBRATED)
+        self._recorded = recorded
+        self._part = part
+        self._anchor_ns = anchor_ns
+        self._rate_hz = 0.0
+        self.since_ns = anchor_ns - 1
+        """Samples up to here are not due: the sensor was off."""
+        self._use(recorded)
+
+    @property
+    def is_configured(self) -> bool:
+        return self._rate_hz > 0.0
+
+    def configure(self, sampling_period_ns: int) -> int:
+        rate_hz = self._part.configured_rate_hz(sampling_period_ns)
+        if rate_hz != self._rate_hz:
+            self._rate_hz = rate_hz
+            self._use(self._thinned(rate_hz))
+        return self._part.configured_period_ns(sampling_period_ns)
+
+    def rows(self, after_ns: int, until_ns: int, shift_ns: int) -> EventColumn:
+        first = bisect_right(self.times, after_ns - shift_ns)
+        rows = self._column[first : bisect_right(self.times, until_ns - shift_ns, first)]
+        return EventColumn(rows.timestamp_ns + shift_ns, rows.values, rows.accuracy) if shift_ns else rows
+
+    def _use(self, column: EventColumn) -> None:
+        self._column = read_only(column)
+        # Bisection over a memoryview takes a third of the time of a numpy search for one instant, and no memory.
+        self.times = column.timestamp_ns.data
+
+    def _thinned(self, rate_hz: float) -> EventColumn:
+        if len(self._recorded) < 2:
+            return self._recorded
+        recorded_hz = 1e9 / float(np.median(np.diff(self._recorded.timestamp_ns)))
+        # A stamp rounded to nanoseconds makes 15 Hz a little more than 15 Hz; that must not thin it.
+        if rate_hz > 0.99 * recorded_hz:
+            return self._recorded
+        thin = thin_by_mean if self._is_gyroscope else thin_by_nearest
+        return thin(self._recorded, rate_hz, self._anchor_ns)
+
+
+def _calibrated(recording: Recording, profile: DeviceProfile, kind: SensorType) -> EventColumn | None:
+    recorded = recording.columns.get(kind)
+    if kind not in UNCALIBRATED_TYPE or profile.calibration[kind].is_identity:
+        return recorded
+    raw = recording.columns.get(UNCALIBRATED_TYPE[kind], recorded)
+    if raw is None:
+        return None
+    return EventColumn(raw.timestamp_ns, profile.calibration[kind].apply(raw.values[:, :3]), raw.accuracy)

@@ -1,0 +1,189 @@
+"""A simulated phone: a motion script seen through the parts of a device profile."""
+
+from bisect import bisect_right
+
+import numpy as np
+from posed.clock import Clock, TimeMap
+from posed.errors import InvalidArgumentError
+from posed.events import EventBatch, EventColumn, SensorInfo, SensorType, Truth
+from posed.hal.calibration import Calibration
+from posed.hal.motion import MotionScript
+from posed.hal.profile import UNCALIBRATED_TYPE, DeviceProfile, exact_period_ns
+from posed.hal.sensor_model import BLOCK_SAMPLES, THESSALONIKI, SensorModel, Site
+
+
+class SimulatedPhone:
+    """A SensorSource whose sample time is the clock's CLOCK_BOOTTIME; the script begins at the first activation.
+
+    Every sensor ticks on its own grid, anchored where the script begins, and time goes on while all are off. The same
+    profile, script, seed (0 or more) and calls give the same samples.
+    """
+
+    def __init__(
+        self, profile: DeviceProfile, clock: Clock, script: MotionScript, seed: int, site: Site = THESSALONIKI
+    ) -> None:
+        self._profile = profile
+        self._clock = clock
+        self._script = script
+        self._site = site
+        self._models = {
+            kind: SensorModel(part, profile.calibration[kind], script, site, seed)
+            for kind, part in profile.sensors.items()
+        }
+        self._rates = {info.handle: profile.sensor(info.handle).rates_hz[-1] for info in profile.sensor_infos()}
+        self._streams: dict[int, _Stream] = {}
+        self._flushes: list[int] = []
+        self._zero_ns: int | None = None
+        self._drained_ns = clock.now_ns()
+
+    @property
+    def sensors(self) -> tuple[SensorInfo, ...]:
+        return self._profile.sensor_infos()
+
+    @property
+    def time_map(self) -> TimeMap:
+        return TimeMap()
+
+    @property
+    def exhausted(self) -> bool:
+        return False
+
+    def activate(self, handle: int, enabled: bool) -> None:
+        """Switch a sensor on, from now on, or off; a sensor never given a period runs at its fastest rate.
+
+        Raises InvalidArgumentError for an unknown handle.
+        """
+        self._profile.sensor(handle)
+        if not enabled:
+            self._streams.pop(handle, None)
+            self._flushes = [asked for asked in self._flushes if asked != handle]
+        elif handle not in self._streams:
+            self._start(handle, max(self._clock.now_ns(), self._drained_ns))
+
+    def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:
+        """Set a sensor's period, 0 or more, and return the one configured (ns); from the last drained instant on.
+
+        Samples are made when they are drained, so the report latency is the caller's affair. Raises
+        InvalidArgumentError for an unknown handle or a negative period or latency.
+        """
+        part = self._profile.sensor(handle)
+        if max_report_latency_ns < 0:
+            raise InvalidArgumentError(f"max_report_latency_ns = {max_report_latency_ns}; allowed: 0 or more")
+        rate_hz = part.configured_rate_hz(sampling_period_ns)
+        if rate_hz != self._rates[handle]:
+            self._rates[handle] = rate_hz
+            running = self._streams.get(handle)
+            if running is not None:
+                self._start(handle, max(running.after_ns, self._drained_ns))
+        return part.configured_period_ns(sampling_period_ns)
+
+    def flush(self, handle: int) -> None:
+        self._active(handle)
+        self._flushes.append(handle)
+
+    def drain(self, until_ns: int) -> EventBatch:
+        # next_ns is compared first: a client of latency 0 drains once an event, with nothing due on most sensors.
+        columns = {
+            handle: stream.take(until_ns) for handle, stream in self._streams.items() if stream.next_ns <= until_ns
+        }
+        self._drained_ns = max(self._drained_ns, until_ns)
+        if not self._flushes:
+            return EventBatch(columns)
+        flushes, self._flushes = tuple(self._flushes), []
+        return EventBatch(columns, flushes)
+
+    def next_sample_ns(self, handle: int) -> int | None:
+        """Return the timestamp of the next sample of a sensor, None if it is not active."""
+        stream = self._streams.get(handle)
+        return None if stream is None else stream.next_ns
+
+    def truth(self, timestamp_ns: int) -> Truth | None:
+        """Return the script's attitude and position at `timestamp_ns`, None before the script began."""
+        if self._zero_ns is None or timestamp_ns < self._zero_ns:
+            return None
+        t = np.array([1e-9 * (timestamp_ns - self._zero_ns)])
+        x, y, z, w = self._script.attitude(t)[0].tolist()
+        east, north, up = self._script.position(t)[0].tolist()
+        quaternion = (x, y, z, w) if w >= 0.0 else (-x, -y, -z, -w)
+        return Truth(timestamp_ns, quaternion, self._site.declination, (east, north, up))
+
+    def _active(self, handle: int) -> None:
+        self._profile.sensor(handle)
+        if handle not in self._streams:
+            name = SensorType(handle).name.lower()
+            raise InvalidArgumentError(f"sensor handle {handle} ({name}) is not active; activate it before a flush")
+
+    def _start(self, handle: int, after_ns: int) -> None:
+        if self._zero_ns is None:
+            self._zero_ns = after_ns
+        kind = self._profile.sensor(handle).type
+        calibration = self._profile.calibration[kind]
+        uncalibrated = handle == UNCALIBRATED_TYPE[kind]
+        self._streams[handle] = _Stream(
+            self._models[kind], calibration, uncalibrated, self._rates[handle], self._zero_ns, after_ns
+        )
+
+
+class _Stream:
+    """An active sensor at one rate: its samples later than `after_ns`, made a block at a time, taken in slices."""
+
+    def __init__(
+        self,
+        model: SensorModel,
+        calibration: Calibration,
+        uncalibrated: bool,
+        rate_hz: float,
+        zero_ns: int,
+        after_ns: int,
+    ) -> None:
+        self._model = model
+        self._calibration = calibration
+        self._uncalibrated = uncalibrated
+        self._rate_hz = rate_hz
+        self._zero_ns = zero_ns
+        self.after_ns = after_ns
+        # Jitter keeps a sample within a third of a period of its instant: none before the last instant passed is later
+        # than after_ns.
+        passed = int((after_ns - zero_ns) / exact_period_ns(rate_hz))
+        self._load(max(passed - 1, 0) // BLOCK_SAMPLES)
+        self._seek(bisect_right(self._stamps, after_ns))
+
+    def take(self, until_ns: int) -> EventColumn:
+        """Return the samples not taken yet that are not later than `until_ns`; at least one has to be due."""
+        parts = []
+        while self.next_ns <= until_ns:
+            end = bisect_right(self._stamps, until_ns, self._offset)
+            parts.append(self._block[self._offset : end])
+            self._seek(end)
+        return parts[0] if len(parts) == 1 else _joined(parts)
+
+    def _seek(self, offset: int) -> None:
+        if offset == BLOCK_SAMPLES:
+            self._load(self._index + 1)
+            offset = 0
+        self._offset = offset
+        self.next_ns = self._stamps[offset]
+
+    def _load(self, index: int) -> None:
+        timestamp_ns, raw = self._model.block(self._rate_hz, index)
+        timestamp_ns += self._zero_ns
+        if self._uncalibrated:
+            values = np.concatenate([raw, np.broadcast_to(self._calibration.bias, raw.shape)], axis=1)
+        else:
+            values = self._calibration.apply(raw)
+        self._index = index
+        self._block = EventColumn(timestamp_ns, values, _HIGH_ACCURACY)
+        self._stamps: list[int] = timestamp_ns.tolist()
+
+
+_HIGH_ACCURACY = np.full(BLOCK_SAMPLES, 3, np.int8)
+"""Android's SENSOR_STATUS_ACCURACY_HIGH, of every sample: a simulated part is never in doubt."""
+_HIGH_ACCURACY.flags.writeable = False
+
+
+def _joined(parts: list[EventColumn]) -> EventColumn:
+    return EventColumn(
+        np.concatenate([part.timestamp_ns for part in parts]),
+        np.concatenate([part.values for part in parts]),
+        np.concatenate([part.accuracy for part in parts]),
+    )

@@ -1,0 +1,47 @@
+"""The one protocol behind which samples come, shaped like Android's ISensors."""
+
+from typing import Protocol
+
+from posed.clock import TimeMap
+from posed.events import EventBatch, SensorInfo, Truth
+
+
+class SensorSource(Protocol):
+    """A phone's sensors: real, recorded or simulated. All times are sample time in ns unless said otherwise.
+
+    A source is given its Clock when it is made. What it yields depends on the calls made between two drains, never on
+    how often it is drained.
+    """
+
+    @property
+    def sensors(self) -> tuple[SensorInfo, ...]:
+        """The physical sensors, in handle order; the same for the life of the source."""
+
+    @property
+    def time_map(self) -> TimeMap:
+        """The present mapping from sample time to CLOCK_BOOTTIME; it moves when a replay pauses or loops."""
+
+    @property
+    def exhausted(self) -> bool:
+        """True once no further sample will ever come."""
+
+    def activate(self, handle: int, enabled: bool) -> None:
+        """Switch a sensor on or off; idempotent. Samples not drained when it goes off are abandoned."""
+
+    def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:
+        """Set a sensor's period, active or not, and return the period configured (ns), which the profile decides."""
+
+    def flush(self, handle: int) -> None:
+        """Ask for one flush-complete behind the samples up to the next drain.
+
+        Raises InvalidArgumentError if the sensor is not active.
+        """
+
+    def drain(self, until_ns: int) -> EventBatch:
+        """Return every sample of the active sensors later than the last drain and not later than `until_ns`."""
+
+    def next_sample_ns(self, handle: int) -> int | None:
+        """Return when the next sample of an active sensor is due, None if none is expected."""
+
+    def truth(self, timestamp_ns: int) -> Truth | None:
+        """Return the true orientation at `timestamp_ns`, None where it is not known."""

@@ -1,0 +1,6 @@
+"""Android's sensor service without sockets: catalogue, arbitration, FIFOs, fused sensors and the pose grid."""
+
+from posed.sensors.connection import EventChunk, SensorEventConnection
+from posed.sensors.service import SensorService
+
+__all__ = ["EventChunk", "SensorEventConnection", "SensorService"]

@@ -1,0 +1,29 @@
+"""The instants on which the poses of one period stand."""
+
+from dataclasses import dataclass
+
+from posed.events import FilterStatus
+
+
+@dataclass(slots=True)
+class PoseGrid:
+    """Instants `anchor_ns + k * period`, k = 0, 1, ...; all sample time, ns. The index k is the pose's sequence."""
+
+    period_us: int
+    anchor_ns: int
+    next_index: int
+    events_before: int
+    """Count of fused events at the last instant passed, to tell how many came since."""
+    occurred: FilterStatus = FilterStatus.OK
+    """What happened in the filter since the last instant."""
+
+    @classmethod
+    def after(cls, period_us: int, anchor_ns: int, now_ns: int, events_fused: int) -> "PoseGrid":
+        """Return the grid whose next instant is the first later than `now_ns`, or the anchor itself if that is."""
+        index = max(0, (now_ns - anchor_ns) // (period_us * 1000) + 1)
+        return cls(period_us, anchor_ns, index, events_fused)
+
+    @property
+    def next_ns(self) -> int:
+        """The next instant."""
+        return self.anchor_ns + self.next_index * self.period_us * 1000

@@ -1,0 +1,64 @@
+"""The FIFO of one listener: order, oldest dropped first, flush-completes kept."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posed.events import EventColumn
+from posed.sensors import SensorEventConnection
+
+
+def _column(first: int, count: int) -> EventColumn:
+    times = np.arange(first, first + count, dtype=np.int64)
+    return EventColumn(times, np.zeros((count, 3)), np.full(count, 3, np.int8))
+
+
+def _drain(connection: SensorEventConnection, max_events: int) -> list[int]:
+    times: list[int] = []
+    while connection:
+        for column in connection.take(max_events).columns.values():
+            times += column.timestamp_ns.tolist()
+    return times
+
+
+def test_events_leave_in_the_order_they_came() -> None:
+    connection = SensorEventConnection(100)
+    connection.append(1, _column(0, 3))
+    connection.append(1, _column(3, 4))
+    assert _drain(connection, max_events=2) == list(range(7))
+    assert connection.events_dropped == 0
+
+
+@given(st.lists(st.integers(1, 12), min_size=1, max_size=12), st.integers(1, 20), st.integers(1, 9))
+def test_the_newest_stay_and_the_dropped_are_counted(sizes: list[int], capacity: int, max_events: int) -> None:
+    connection = SensorEventConnection(capacity)
+    total = 0
+    for size in sizes:
+        connection.append(1, _column(total, size))
+        total += size
+    kept = min(total, capacity)
+    assert connection.events_cached == kept
+    assert connection.events_dropped == total - kept
+    assert _drain(connection, max_events) == list(range(total - kept, total))
+    assert connection.events_cached == 0
+
+
+def test_a_message_ends_behind_a_flush_complete_so_that_order_holds() -> None:
+    connection = SensorEventConnection(100)
+    connection.append(1, _column(0, 2))
+    connection.append_flush_complete(1)
+    connection.append(1, _column(2, 2))
+    first, second = connection.take(100), connection.take(100)
+    assert (first.columns[1].timestamp_ns.tolist(), first.flush_completes) == ([0, 1], (1,))
+    assert (second.columns[1].timestamp_ns.tolist(), second.flush_completes) == ([2, 3], ())
+
+
+def test_a_flush_complete_outlives_the_events_dropped_around_it() -> None:
+    connection = SensorEventConnection(2)
+    connection.append(1, _column(0, 2))
+    connection.append_flush_complete(1)
+    connection.append(4, _column(2, 5))
+    assert connection.events_dropped == 5
+    first, second = connection.take(100), connection.take(100)
+    assert (first.columns, first.flush_completes) == ({}, (1,))
+    assert second.columns[4].timestamp_ns.tolist() == [5, 6]
