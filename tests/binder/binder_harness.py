@@ -23,6 +23,7 @@ from posed.binder.stub import Caller, Stub
 from posed.proto import binder_pb2, events_pb2, sensors_pb2, service_manager_pb2
 
 T = TypeVar("T")
+NOBODY = 65534
 PATIENCE_S = 20.0
 """How long a test waits for what must happen: long, so that only what never happens fails."""
 
@@ -176,7 +177,7 @@ class ServerThread:
             poller.register(each, zmq.POLLIN)
         while not self._stopping:
             more = server.process()
-            timeout = 0 if more else None if server.retry_s is None else server.retry_s * 1000
+            timeout = 0 if more else None if server.retry_s is None else round(server.retry_s * 1000)
             if self._wait_end.fileno() in dict(poller.poll(timeout)):
                 self._wait_end.recv(1)
                 if not self._work.empty():
@@ -208,10 +209,10 @@ def get_service(connection: Connection, name: str = "sensorservice") -> Any:
     return connection.proxy(MANAGER, "servicemanager").getService(request)
 
 
-def spawn(role: str, path: Path, **options: Any) -> subprocess.Popen[str]:
+def spawn(role: str, path: Path) -> subprocess.Popen[str]:
     """Start this file as a process of its own: `client`, `server`, `foreign-client` or `foreign-server`."""
     command = [sys.executable, __file__, role, str(path)]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 class RawClient:
@@ -227,7 +228,7 @@ class RawClient:
             ready += _property(name.encode().replace(b"_", b"-"), value)
         self.socket.sendall(b"\x04" + bytes([len(ready)]) + ready)
         assert len(self._receive(64)) == 64
-        assert self.receive_frame()[0] == 4
+        assert self._receive_any()[0] == 4
 
     def send(self, *frames: bytes) -> None:
         for index, frame in enumerate(frames):
@@ -235,15 +236,20 @@ class RawClient:
             self.socket.sendall(struct.pack(">BQ", flags, len(frame)) + frame)
 
     def receive_frame(self) -> tuple[int, bytes]:
-        """Return flags and body of the next frame; (-1, b"") once the connection is closed."""
+        """Return flags and body of the next message frame; (-1, b"") once the connection is closed."""
+        while (received := self._receive_any())[0] == 4:
+            pass  # a heartbeat, not answered
+        return received
+
+    def close(self) -> None:
+        self.socket.close()
+
+    def _receive_any(self) -> tuple[int, bytes]:
         head = self._receive(2)
         if len(head) < 2:
             return -1, b""
         size = head[1] if not head[0] & 2 else struct.unpack(">Q", head[1:] + self._receive(7))[0]
         return head[0], self._receive(size)
-
-    def close(self) -> None:
-        self.socket.close()
 
     def _receive(self, size: int) -> bytes:
         data = b""
@@ -291,7 +297,8 @@ def _run_server(path: Path) -> None:
 
 
 def _run_foreign_client(path: Path) -> None:
-    """Send a ping as whoever we are, and say what comes back within a second: bytes, or nothing."""
+    """Send a ping as another user, and say what comes back within a second: bytes, or nothing."""
+    _become_nobody()
     with zmq.Context() as context, context.socket(zmq.DEALER) as dealer:
         dealer.setsockopt(zmq.LINGER, 0)
         dealer.connect(f"ipc://{path}")
@@ -300,7 +307,8 @@ def _run_foreign_client(path: Path) -> None:
 
 
 def _run_foreign_server(path: Path) -> None:
-    """Answer one ping, as whoever we are."""
+    """Answer one ping as another user."""
+    _become_nobody()
     with zmq.Context() as context, context.socket(zmq.ROUTER) as router:
         router.bind(f"ipc://{path}")
         os.chmod(path, 0o666)
@@ -310,6 +318,13 @@ def _run_foreign_server(path: Path) -> None:
         reply = binder_pb2.Parcel(reply=binder_pb2.Reply(call_id=call_id))
         router.send_multipart([routing_id, reply.SerializeToString()])
         sys.stdin.readline()
+
+
+def _become_nobody() -> None:
+    # Only now: another user may not be able to read the interpreter.
+    os.setgroups([])
+    os.setgid(NOBODY)
+    os.setuid(NOBODY)
 
 
 def _ping() -> bytes:

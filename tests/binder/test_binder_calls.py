@@ -84,7 +84,7 @@ def test_unexpected_error_is_logged_and_not_told(
 ) -> None:
     service = connection.proxy(SENSORS, "sensorservice")
     server.sensors.error = error
-    with pytest.raises(RemoteError, match="^internal error$") as caught:
+    with pytest.raises(RemoteError, match=r"^internal error$") as caught:
         service.getSensorList(EMPTY)
     assert caught.value.exception_code is ExceptionCode.TRANSACTION_FAILED
     assert type(error).__name__ in caplog.text
@@ -310,7 +310,7 @@ def test_proxy_takes_only_its_methods_and_requests(connection: Connection) -> No
 
 
 def test_call_without_a_daemon_fails_at_once(unconnected: Connection) -> None:
-    with pytest.raises(DeadObjectError, match="control.sock"):
+    with pytest.raises(DeadObjectError, match=r"control\.sock"):
         unconnected.ping(timeout_s=600)
     with pytest.raises(DeadObjectError):
         unconnected.proxy(LISTENER, "listener").onSensorEvents(events(1))
@@ -345,8 +345,8 @@ connection.close()
 context.term()
 """
     command = [sys.executable, "-W", "ignore", "-c", script, str(server.path)]
-    here = str(Path(__file__).parent)
-    assert subprocess.run(command, env={**os.environ, "PYTHONPATH": here}, timeout=60).returncode == 0
+    path = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
+    assert subprocess.run(command, env={**os.environ, "PYTHONPATH": path}, timeout=60).returncode == 0
 
 
 def test_two_stubs_do_not_share_state() -> None:

@@ -132,7 +132,8 @@ def test_words_of_the_dead_are_not_given_to_who_has_their_descriptor(server: Ser
     def speak_leave_and_return(_server: object) -> None:
         for _ in range(20):
             client = RawClient(server.path)
-            client.send(bind_call(1))
+            for call_id in range(1, 11):
+                client.send(bind_call(call_id))
             client.close()
         living.extend(RawClient(server.path) for _ in range(3))
         for client in living:
@@ -143,6 +144,7 @@ def test_words_of_the_dead_are_not_given_to_who_has_their_descriptor(server: Ser
         flags, _body = client.receive_frame()
         assert flags == 0
     server.wait_until(lambda server: len(server.peers) == 3)
+    assert server.manager.died.qsize() == server.manager.bound.qsize() - 3
     for client in living:
         client.close()
     server.wait_until(lambda server: not server.peers)

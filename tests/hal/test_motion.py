@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from posed.errors import InvalidArgumentError
 from posed.events import Float64Array
 from posed.hal import rotation

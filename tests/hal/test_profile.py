@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from posed.errors import InvalidArgumentError, ProfileError
 from posed.events import RateMode, SensorType
 from posed.hal.profile import DeviceProfile, SensorProfile, load_profile, profile_names

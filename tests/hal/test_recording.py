@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+
 from posed.errors import MissingExtraError, RecordingError
 from posed.events import SensorType
 from posed.hal.attitude_trial import load_trial

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from posed.clock import VirtualClock
 from posed.errors import InvalidArgumentError, RecordingError
 from posed.events import EventBatch, EventColumn, SensorType
@@ -96,7 +97,7 @@ def test_full_rate_yields_what_was_recorded() -> None:
     batch = source.drain(LAST)
     for info in source.sensors:
         assert_same(batch.columns[info.handle], RECORDING.columns[info.type])
-    assert source.exhausted
+    assert source.end_ns == LAST
 
 
 def test_a_sensor_never_given_a_period_runs_at_the_profiles_fastest() -> None:
@@ -255,12 +256,10 @@ def test_next_sample_follows_the_drain() -> None:
     assert source.next_sample_ns(MAG) is None
 
 
-def test_exhausted_only_once_all_is_drained() -> None:
+def test_it_ends_with_the_last_sample_of_any_sensor_and_yields_nothing_behind_it() -> None:
     source, _ = a_source(on=(GYRO,))
-    source.drain(LAST - 1)
-    assert not source.exhausted
+    assert source.end_ns == LAST
     source.drain(LAST)
-    assert source.exhausted
     assert len(source.drain(LAST + 10**12)) == 0
 
 
@@ -277,7 +276,7 @@ def test_a_loop_continues_sample_time_behind_a_gap() -> None:
     assert np.max(np.diff(found.timestamp_ns)) > 500 * MS
     assert np.min(np.diff(found.timestamp_ns)) > 0
     assert found.timestamp_ns[-1] > FIRST + 2 * pass_ns
-    assert not source.exhausted
+    assert source.end_ns is None
     assert source.next_sample_ns(MAG) == min(
         t
         for t in (RECORDING.columns[SensorType.MAGNETIC_FIELD].timestamp_ns + 2 * pass_ns).tolist()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from posed.clock import TimeMap, VirtualClock
 from posed.errors import InvalidArgumentError
 from posed.events import EventColumn, Float64Array, RateMode
@@ -72,7 +73,7 @@ class TestSource:
         source: SensorSource = phone()[0]
         assert [sensor.handle for sensor in source.sensors] == [1, 2, 4, 14, 16, 35]
         assert source.time_map == TimeMap()
-        assert not source.exhausted
+        assert source.end_ns is None
 
     @pytest.mark.parametrize(
         ("mode", "events"), [(RateMode.NORMAL, 25), (RateMode.UI, 45), (RateMode.GAME, 150), (RateMode.FASTEST, 350)]
@@ -195,6 +196,16 @@ class TestSource:
         assert again.timestamp_ns[0] > START + 10 * SECOND
         never_off = drained(phone(handles=(GYROSCOPE,))[0], 12, GYROSCOPE)
         assert_same(again, never_off[-len(again) :])
+
+    @pytest.mark.parametrize("seed", range(6))
+    @pytest.mark.parametrize("periods", [1, 255, 256, 257, 512, 700])
+    def test_a_sensor_activated_on_its_grid_misses_nothing_later(self, periods: int, seed: int) -> None:
+        whole = drained(phone(handles=(GYROSCOPE,), seed=seed)[0], 5, GYROSCOPE)
+        source, clock = phone(handles=(ACCELEROMETER,), seed=seed)
+        now_ns = START + periods * SECOND // 200
+        clock.advance_to(now_ns)
+        source.activate(GYROSCOPE, True)
+        assert_same(drained(source, 5, GYROSCOPE), whole[int(np.searchsorted(whole.timestamp_ns, now_ns, "right")) :])
 
     def test_flush_completes_once_a_call_in_order(self) -> None:
         source, _ = phone()
@@ -339,6 +350,11 @@ class TestErrors:
         rate = noisy.sensor(GYROSCOPE).configured_rate_hz(period_us * 1000)
         values = drained(source, 200, GYROSCOPE).values
         np.testing.assert_allclose(values.std(axis=0), 0.01 * math.sqrt(rate), rtol=0.1)
+
+    def test_noise_never_repeats(self) -> None:
+        noisy = changed(ideal(), noise_density=0.01)
+        values = drained(phone(noisy, "still", handles=(GYROSCOPE,))[0], 60, GYROSCOPE).values
+        assert len(np.unique(values)) == values.size
 
     def test_the_profiles_noise_is_what_a_sample_shows(self) -> None:
         columns = phone(TABLET, "still")[0].drain(START + 60 * SECOND).columns

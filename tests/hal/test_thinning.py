@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from posed.events import EventColumn
 from posed.hal.thinning import thin_by_mean, thin_by_nearest
 

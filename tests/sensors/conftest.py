@@ -42,7 +42,7 @@ class RegularSource:
             for kind in types
         )
         self.time_map = TimeMap(offset_ns=1_000_000_000)
-        self.exhausted = False
+        self.end_ns: int | None = None
         self.calls: list[tuple[Any, ...]] = []
         self._period_ns = {sensor.handle: 200_000_000 for sensor in self.sensors}
         self._done_ns: dict[int, int] = {}
@@ -71,6 +71,7 @@ class RegularSource:
         columns = {}
         for handle, done_ns in self._done_ns.items():
             period = self._period_ns[handle]
+            until_ns = until_ns if self.end_ns is None else min(until_ns, self.end_ns)
             times = np.arange(done_ns // period + 1, until_ns // period + 1, dtype=np.int64) * period
             columns[handle] = EventColumn(times, np.full((len(times), 3), 1.0), np.full(len(times), 3, np.int8))
             self._done_ns[handle] = until_ns

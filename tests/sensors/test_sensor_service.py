@@ -314,12 +314,24 @@ def test_a_slow_fused_sensor_still_runs_the_accelerometer_at_20_hz(make_bench: M
     assert (periods[ACC], periods[MAG], periods[GYRO]) == (50, 10, 5)
 
 
-def test_a_recording_that_ended_moves_no_grid_on(make_bench: MakeBench) -> None:
+@pytest.mark.parametrize("steps_ms", [(900,), (250, 260, 270, 900), (205, 206, 900)])
+def test_a_recording_that_ended_moves_no_grid_on(make_bench: MakeBench, steps_ms: tuple[int, ...]) -> None:
     bench = make_bench()
+    bench.source.end_ns = 260_000_000
     bench.service.register_pose("a", 100_000, 20_000)
-    bench.advance_ms(250)
-    bench.source.exhausted = True
-    bench.service.take_poses()
-    bench.advance_ms(900)
+    for now_ms in steps_ms:
+        bench.advance_ms(now_ms)
+    assert [pose.instant_ns // 1_000_000 for pose in bench.service.take_poses()] == [20, 120, 220]
     assert bench.service.next_deadline_ns() is None
-    assert all(pose.instant_ns <= 900_000_000 for pose in bench.service.take_poses())
+
+
+def test_the_end_of_a_recording_lets_go_what_waits_for_its_latency(make_bench: MakeBench) -> None:
+    bench = make_bench()
+    bench.source.end_ns = 100_000_000
+    listener = bench.service.connect()
+    bench.service.enable(listener, GYRO, 20_000, 1_000_000)
+    bench.advance_ms(80)
+    assert bench.deadline_ms == 1000
+    bench.advance_ms(1000)
+    assert _taken_ms(listener, GYRO) == [20, 40, 60, 80, 100]
+    assert bench.service.next_deadline_ns() is None

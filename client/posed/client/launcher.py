@@ -3,6 +3,7 @@
 import contextlib
 import fcntl
 import os
+import select
 import socket
 import subprocess
 import sys
@@ -53,39 +54,49 @@ def _start_lock(directory: Path) -> Iterator[None]:
         os.close(fd)
 
 
+# Forks once more, so that the daemon is nobody's child and leaves no zombie behind in a client that outlives it.
+_DETACH = (
+    "import os, sys; os.fork() and os._exit(0); os.setsid(); os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+)
+
+
 def _start(directory: Path, arguments: Sequence[str]) -> None:
     """Spawn the daemon and wait for its READY=1, the message systemd would get (sd_notify(3))."""
     log_path = directory / _LOG_NAME
     ready_path = directory / f"ready-{os.getpid()}.sock"
     ready_path.unlink(missing_ok=True)
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as ready, log_path.open("wb") as log:
+    alive, held_by_daemon = os.pipe()
+    with (
+        socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as ready,
+        log_path.open("wb") as log,
+        open(alive, "rb", buffering=0) as alive_pipe,
+    ):
         ready.bind(str(ready_path))
         try:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "posed.cli", "serve", *arguments],
+            subprocess.run(
+                [sys.executable, "-ISc", _DETACH, "-m", "posed.cli", "serve", *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=log,
                 env={**os.environ, "NOTIFY_SOCKET": str(ready_path)},
                 cwd="/",
-                start_new_session=True,
+                pass_fds=(held_by_daemon,),
+                check=True,
             )
-            _await_ready(process, ready, log_path)
+            os.close(held_by_daemon)
+            _await_ready(ready, alive_pipe.fileno(), log_path)
         finally:
             ready_path.unlink(missing_ok=True)
 
 
-def _await_ready(process: "subprocess.Popen[bytes]", ready: socket.socket, log_path: Path) -> None:
-    ready.settimeout(0.05)
+def _await_ready(ready: socket.socket, alive: int, log_path: Path) -> None:
+    """Return at READY=1. The pipe `alive` ends when the daemon does."""
     deadline = time.monotonic() + _READY_TIMEOUT_S
-    while time.monotonic() < deadline:
-        with contextlib.suppress(TimeoutError):
-            if b"READY=1" in ready.recv(256).split(b"\n"):
-                return
-        if process.poll() is not None:
+    while (remaining := deadline - time.monotonic()) > 0:
+        readable, _, _ = select.select([ready.fileno(), alive], [], [], remaining)
+        if ready.fileno() in readable and b"READY=1" in ready.recv(256).split(b"\n"):
+            return
+        if alive in readable:
             said = log_path.read_text(errors="replace").strip().splitlines()
-            why = said[-1] if said else f"exit code {process.returncode}"
-            raise ServiceUnavailableError(f"the daemon did not start: {why}")
-    process.kill()
-    process.wait()
+            raise ServiceUnavailableError(f"the daemon did not start: {said[-1] if said else 'it said nothing'}")
     raise ServiceUnavailableError(f"the daemon was not ready after {_READY_TIMEOUT_S:.0f} s; its log is {log_path}")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 
 import zmq
+
 from posed.binder.runtime import endpoint, pose_path
 from posed.binder.sockets import Socket, sub
 from posed.binder.stub import Caller, Stub
@@ -125,7 +126,10 @@ class PoseClient:
             return self._hand_out(self._waiting.popleft())
 
     def wait_connected(self, timeout_s: float = 5.0) -> None:
-        """Wait until a daemon is connected; raises ServiceUnavailableError with the reason after `timeout_s`."""
+        """Wait until a daemon is connected.
+
+        Raises ServiceUnavailableError with the reason after `timeout_s`, at once if the binding died or was closed.
+        """
         self._service.wait_connected(timeout_s)
 
     def set_rate_mode(self, rate_mode: int) -> None:

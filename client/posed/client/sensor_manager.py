@@ -84,7 +84,10 @@ class SensorManager:
         return self._service.reason
 
     def wait_connected(self, timeout_s: float = 5.0) -> None:
-        """Wait until a daemon is connected; raises ServiceUnavailableError with the reason after `timeout_s`."""
+        """Wait until a daemon is connected.
+
+        Raises ServiceUnavailableError with the reason after `timeout_s`, at once if the binding died or was closed.
+        """
         self._service.wait_connected(timeout_s)
 
     def get_sensor_list(self, sensor_type: int = Sensor.TYPE_ALL) -> list[Sensor]:

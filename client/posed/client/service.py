@@ -12,6 +12,7 @@ from typing import Any, Protocol, TypeVar
 
 import zmq
 from google.protobuf.descriptor import ServiceDescriptor
+
 from posed.binder.connection import Connection
 from posed.binder.interface import interface_of
 from posed.binder.proxy import Proxy
@@ -101,10 +102,13 @@ class Service:
         return self._state
 
     def wait_connected(self, timeout_s: float) -> None:
-        """Wait until a daemon is connected; raises ServiceUnavailableError with the reason after `timeout_s`."""
+        """Wait until a daemon is connected.
+
+        Raises ServiceUnavailableError with the reason after `timeout_s`, at once if the binding died or was closed.
+        """
+        waiting = (ServiceState.CONNECTING, ServiceState.DISCONNECTED)
         with self._changed:
-            done = (ServiceState.CONNECTED, ServiceState.CLOSED)
-            self._changed.wait_for(lambda: self._state in done, timeout_s)
+            self._changed.wait_for(lambda: self._state not in waiting, timeout_s)
             if self._state is not ServiceState.CONNECTED:
                 raise ServiceUnavailableError(f"posed is {self._state.value}: {self.reason}")
 

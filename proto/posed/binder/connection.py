@@ -38,7 +38,7 @@ class Connection:
     def __init__(self, socket_path: Path, context: Context) -> None:
         self._path = socket_path
         self._owner_pid = os.getpid()
-        address = endpoint(socket_path)
+        self._address = endpoint(socket_path)
         self._dealer: Socket = dealer(context)
         self._monitor: Socket = self._dealer.get_monitor_socket(zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_DISCONNECTED)
         self.sockets: list[Socket] = [self._dealer, self._monitor]
@@ -52,7 +52,7 @@ class Connection:
         self._happened: deque[Callable[[], None]] = deque()
         self._replies: dict[int, Reply | None] = {}
         self._last_call_id = 0
-        self._dealer.connect(address)
+        self._dealer.connect(self._address)
 
     @property
     def connected(self) -> bool:
@@ -135,19 +135,28 @@ class Connection:
         return self._send_now(encode_transaction(0, target, code, payload))
 
     def _read(self) -> None:
-        for event, _fd in monitor_events(self._monitor):
+        lost = False
+        for event, _value in monitor_events(self._monitor):
+            lost = self._lose(self._daemon) if self._daemon is not None else lost
             if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
-                self._daemon = Peer(b"", _UNKNOWN, _UNKNOWN, self._send_now)
+                self._daemon = Peer(b"", _UNKNOWN, _UNKNOWN, self._send_if_connected)
                 self._happened.append(self._tell_connected)
-            elif event == zmq.EVENT_DISCONNECTED and self._daemon is not None:
-                # What still arrived comes before the loss. None of it is from a later connection: on that one the
-                # daemon, not called yet, has nothing to say.
-                while self._read_parcels():
-                    pass
-                self._happened.append(self._daemon.die)
-                self._happened.append(self._tell_disconnected)
-                self._daemon = None
+        if lost and self._daemon is None:
+            # Calls that were not sent any more must not reach the next daemon. ZMQ_IMMEDIATE would see to it too, but
+            # throws away with them what the last one sent and was not read yet: its farewell.
+            self._dealer.disconnect(self._address)
+            self._dealer.connect(self._address)
         self._read_parcels()
+
+    def _lose(self, daemon: Peer) -> bool:
+        # What still arrived comes before the loss. None of it is from a later connection: on that one the daemon, not
+        # called yet, has nothing to say.
+        while self._read_parcels():
+            pass
+        self._happened.append(daemon.die)
+        self._happened.append(self._tell_disconnected)
+        self._daemon = None
+        return True
 
     def _read_parcels(self) -> bool:
         """Take in what has arrived, a bounded number of parcels; True if there is more."""
@@ -201,6 +210,9 @@ class Connection:
         except zmq.Again:
             return False
         return True
+
+    def _send_if_connected(self, parcel: bytes) -> bool:
+        return self._daemon is not None and self._send_now(parcel)
 
     def _wait(self, dealer_events: int, deadline: float, otherwise: str) -> None:
         """Wait until something happens and take it in; raises TransactionTimeoutError at the deadline."""

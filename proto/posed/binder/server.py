@@ -4,6 +4,7 @@ import logging
 import os
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -23,6 +24,14 @@ from posed.proto.service_manager_pb2 import GetServiceRequest
 __all__ = ["Peer", "Server"]
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(slots=True)
+class _Unsent:
+    """Replies that found their peer's queue full."""
+
+    parcels: deque[bytes] = field(default_factory=deque)
+    bytes: int = 0
 
 
 class Server:
@@ -45,8 +54,8 @@ class Server:
         # Every open connection by its file descriptor; None until its first message says which peer it is.
         self._connections: dict[int, Peer | None] = {}
         self._opened: dict[Peer, set[str]] = {}
+        self._unsent: dict[Peer, _Unsent] = {}
         self._unreachable: list[Peer] = []
-        self._unsent: dict[Peer, deque[bytes]] = {}
         try:
             bind_socket(self._router, socket_path)
         except BaseException:
@@ -120,10 +129,12 @@ class Server:
             return None
         if uid != os.getuid() or fd not in self._connections:
             return None
-        predecessor = self._connections[fd]
-        if predecessor is not None:
-            # It spoke, died, and its descriptor was given to this connection before its words were read.
-            self._bury(predecessor)
+        known = self._connections[fd]
+        if known is not None:
+            # Two peers on one descriptor: one of them spoke and died before its words were read. The ids count up.
+            if _count(known.id) - _count(routing_id) & 0x80000000 == 0:
+                return None
+            self._bury(known)
         peer = Peer(routing_id, uid, pid, lambda parcel: self.send(peer, parcel))
         self._connections[fd] = peer
         self._peers[routing_id] = peer
@@ -174,9 +185,10 @@ class Server:
     def _reply(self, peer: Peer, parcel: bytes) -> None:
         if self.send(peer, parcel) or not peer.alive:
             return
-        unsent = self._unsent.setdefault(peer, deque())
-        if len(unsent) < _UNSENT_REPLIES:
-            unsent.append(parcel)
+        unsent = self._unsent.setdefault(peer, _Unsent())
+        if unsent.bytes + len(parcel) <= _UNSENT_BYTES:
+            unsent.parcels.append(parcel)
+            unsent.bytes += len(parcel)
         else:
             _log.debug("%r reads none of its replies; one is dropped", peer)
 
@@ -185,10 +197,10 @@ class Server:
         unsent = self._unsent.get(peer)
         if unsent is None:
             return True
-        while unsent:
-            if not self._send_now(peer, unsent[0]):
+        while unsent.parcels:
+            if not self._send_now(peer, unsent.parcels[0]):
                 return False
-            unsent.popleft()
+            unsent.bytes -= len(unsent.parcels.popleft())
         del self._unsent[peer]
         return True
 
@@ -225,9 +237,14 @@ class Server:
         self._router.close()
 
 
+def _count(routing_id: bytes) -> int:
+    return int.from_bytes(routing_id[1:], "big")
+
+
 _PARCELS_AT_ONCE = 100
 _RETRY_S = 0.01
-_UNSENT_REPLIES = 64
+# What a peer that calls and never reads can make the daemon hold, beside its queue.
+_UNSENT_BYTES = 4 * 1024 * 1024
 
 _SERVICE_MANAGER = interface_of(_SERVICE_MANAGER_FILE.services_by_name["IServiceManager"])
 _GET_SERVICE = _SERVICE_MANAGER.methods_by_name["getService"].code

@@ -45,8 +45,6 @@ def dealer(context: Context) -> Socket:
     # connection 2.1 s later. At 350 events/s, a message each, 1,000 give a busy client 3 s before that.
     socket = _connected(context, zmq.DEALER, high_water_mark=1000)
     socket.setsockopt(zmq.SNDHWM, 64)
-    # Without it calls made while no daemon is there are kept, and delivered to the next one.
-    socket.setsockopt(zmq.IMMEDIATE, 1)
     socket.setsockopt(zmq.LINGER, _FAREWELL_MS)
     return socket
 
@@ -92,6 +90,9 @@ def _bound(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket = _socket(context, kind, high_water_mark)
     # The mode of the directory keeps strangers out; this is the lock behind it.
     socket.setsockopt(zmq.IPC_FILTER_UID, os.getuid())
+    # What does not begin as ZMTP 3 passes for ZMTP 1, which has no heartbeat: an HTTP request would keep its connection
+    # for ever. A domain for ZAP, though nobody serves it, makes libzmq refuse the old versions.
+    socket.setsockopt(zmq.ZAP_DOMAIN, b"posed")
     return socket
 
 

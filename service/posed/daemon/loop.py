@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import zmq
+
 from posed.binder.runtime import InstanceLock, control_path, pose_path, runtime_directory
 from posed.binder.server import Server
 from posed.binder.sockets import context
@@ -95,9 +96,14 @@ class _Daemon:
             poller.register(signal_fd, zmq.POLLIN)
             sd_notify("READY=1")
             _log.info("ready: %s", self._describe())
+            ready = dict(poller.poll(0))
+            more = True
             while self._signal is None and not self._lifecycle.over:
-                more = self._server.process()
-                self._publisher.read_subscriptions()
+                # Trying a socket that has nothing costs an exception each: 4 % of the daemon's whole CPU time.
+                if more or any(input_socket in ready for input_socket in self._server.sockets):
+                    more = self._server.process()
+                if self._publisher.socket in ready:
+                    self._publisher.read_subscriptions()
                 self._service.advance()
                 self._publisher.publish(self._service.take_poses())
                 self._sensors.deliver(self._header)
@@ -109,7 +115,8 @@ class _Daemon:
                     deadlines.append(wait_for_bind_ns)
                 if self._server.retry_s is not None:
                     deadlines.append(now_ns + int(self._server.retry_s * 1e9))
-                poller.poll(0 if more else _timeout_ms(deadlines, now_ns))
+                ready = dict(poller.poll(0 if more or self._lifecycle.over else _timeout_ms(deadlines, now_ns)))
+                more = more or self._server.retry_s is not None
         reason = "it was told to stop" if self._signal is None else f"it got {signal.Signals(self._signal).name}"
         _log.info("stopping: %s", reason)
         sd_notify("STOPPING=1")

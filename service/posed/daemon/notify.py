@@ -1,7 +1,10 @@
 """Readiness for systemd: the datagram protocol of sd_notify(3)."""
 
+import logging
 import os
 import socket
+
+_log = logging.getLogger(__name__)
 
 
 def sd_notify(state: str) -> None:
@@ -12,4 +15,8 @@ def sd_notify(state: str) -> None:
     if address.startswith("@"):
         address = "\0" + address[1:]
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as notify_socket:
-        notify_socket.sendto(state.encode(), address)
+        try:
+            notify_socket.sendto(state.encode(), address)
+        except OSError as error:
+            # Who waited only for the readiness is gone by now; the service does not depend on being heard.
+            _log.debug("%s not told to %s: %s", state, address, error)

@@ -4,6 +4,7 @@ import logging
 from pathlib import Path
 
 import zmq
+
 from posed.binder.runtime import bind_socket, unlink_socket
 from posed.binder.sockets import xpub
 from posed.clock import Clock

@@ -93,38 +93,46 @@ class DcmState:
     @classmethod
     def from_dict(cls, saved: Any) -> "DcmState":
         """Return the state that `to_dict` gave; raises InvalidArgumentError for anything else."""
-        return _filled(cls, saved, "the saved state")
+        return _filled(cls, saved, "state")
 
 
 _T = TypeVar("_T")
 
 
-def _filled(kind: type[_T], saved: Any, where: str) -> _T:
+def _filled(kind: type[_T], saved: Any, path: str) -> _T:
     """Return a dataclass of scalars, events and further such dataclasses with the saved values in it."""
     blank: Any = kind()
     wanted = {each.name for each in fields(blank)}
-    if not isinstance(saved, Mapping) or saved.keys() != wanted:
-        named = sorted(map(str, wanted ^ set(saved))) if isinstance(saved, Mapping) else [type(saved).__name__]
-        raise InvalidArgumentError(f"{where} does not fit, see {', '.join(named)}; start the filter afresh")
+    if not isinstance(saved, Mapping):
+        raise _misfit(path, saved)
+    for name in wanted ^ saved.keys():
+        raise _misfit(f"{path}.{name}", "missing" if name in wanted else "unknown")
     for name in wanted:
         default = getattr(blank, name)
         value = saved[name]
         if is_dataclass(default):
-            value = _filled(type(default), value, f"{where}, {name},")
+            value = _filled(type(default), value, f"{path}.{name}")
         elif isinstance(default, list):
-            value = [_event(event, f"{where}, {name},") for event in value]
+            value = _events(value, f"{path}.{name}")
         elif not _fits(value, default):
-            raise InvalidArgumentError(f"{where}, {name}, is {value!r}; start the filter afresh")
+            raise _misfit(f"{path}.{name}", value)
         setattr(blank, name, value)
     return cast(_T, blank)
 
 
-def _event(saved: Any, where: str) -> tuple[int, int, float, float, float]:
+def _events(saved: Any, path: str) -> list[tuple[int, int, float, float, float]]:
     blank = (0, 0, 0.0, 0.0, 0.0)
-    if len(saved) != len(blank) or not all(map(_fits, saved, blank)):
-        raise InvalidArgumentError(f"{where} holds {saved!r}; start the filter afresh")
-    return cast(tuple[int, int, float, float, float], tuple(saved))
+    if not isinstance(saved, list):
+        raise _misfit(path, saved)
+    for event in saved:
+        if not isinstance(event, list) or len(event) != len(blank) or not all(map(_fits, event, blank)):
+            raise _misfit(path, event)
+    return [tuple(event) for event in saved]
 
 
 def _fits(value: Any, default: Any) -> bool:
     return type(value) is type(default) and (not isinstance(value, float) or math.isfinite(value))
+
+
+def _misfit(path: str, value: Any) -> InvalidArgumentError:
+    return InvalidArgumentError(f"the saved {path} is {value!r}, which is no state of this filter; start it afresh")

@@ -89,8 +89,8 @@ class DirectionCosines:
 
         The column follows the axis that is most nearly vertical, cyclically: z up takes x, x up takes y, y up takes z
         (Patonis 2018, Fig. 1), so its axis is never further than 45 degrees from the horizon. With p that axis and u
-        row 3, v = e_p - C[2, p] u and w = u x e_p span the horizon and are equally long; rows 1 and 2 are the combinations
-        that reproduce the column: Eq. 1 without its angles.
+        row 3, v = e_p - C[2, p] u and w = u x e_p span the horizon and are equally long; rows 1 and 2 are the
+        combinations that reproduce the column: Eq. 1 without its angles.
         """
         ux = self.up_x
         uy = self.up_y

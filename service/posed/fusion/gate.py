@@ -25,7 +25,10 @@ class GateParams:
     most disturbances last, short enough for a phone picked up from where its first reference was wrong.
     """
     patience_s: float = 60.0
-    """s of unbroken rejection after which samples count again, with `late_weight`; ends any lock, also at rest."""
+    """s of unbroken rejection after which samples count again, with `late_weight`; ends any lock, also at rest.
+
+    They stay flagged until the reference fits: whoever lies beside steel for long should know.
+    """
     late_weight: float = 1.0 / 16.0
     """Weight of a sample believed only because patience ran out: one sixteenth is four times its sigma."""
 

@@ -46,9 +46,11 @@ class RestState:
 
     at_rest: bool = False
     still_s: float = 0.0
+    has_rate: bool = False
     rate_x: float = 0.0
     rate_y: float = 0.0
     rate_z: float = 0.0
+    has_acceleration: bool = False
     acceleration_x: float = 0.0
     acceleration_y: float = 0.0
     acceleration_z: float = 0.0
@@ -76,7 +78,8 @@ class RestBias:
     def take_rate(self, x: float, y: float, z: float, dt: float) -> None:
         """Take a gyroscope sample (rad/s, bias included) that stands for the last `dt` > 0 seconds."""
         s = self.state
-        gain = dt / (self._mean_s + dt)
+        gain = dt / (self._mean_s + dt) if s.has_rate else 1.0
+        s.has_rate = True
         dx = x - s.rate_x
         dy = y - s.rate_y
         dz = z - s.rate_z
@@ -106,7 +109,8 @@ class RestBias:
     def take_acceleration(self, x: float, y: float, z: float, dt: float) -> None:
         """Take an accelerometer sample (m/s2) that stands for the last `dt` > 0 seconds."""
         s = self.state
-        gain = dt / (self._mean_s + dt)
+        gain = dt / (self._mean_s + dt) if s.has_acceleration else 1.0
+        s.has_acceleration = True
         dx = x - s.acceleration_x
         dy = y - s.acceleration_y
         dz = z - s.acceleration_z

@@ -4,9 +4,7 @@ from pathlib import Path
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError
-from posed.hal.motion import DEFAULT_SCRIPT, make_script
 from posed.hal.profile import DeviceProfile
-from posed.hal.simulated import SimulatedPhone
 from posed.hal.source import SensorSource
 
 
@@ -18,15 +16,18 @@ def open_source(
     seed (0 or more) is the simulation's; speed (times real time) and loop are a replay's. Raises InvalidArgumentError
     for anything else, and RecordingError for a recording that cannot be read.
     """
+    # Each source is imported only where it is wanted: numpy.random alone is 7 MB, and a replay needs none.
     kind, _, rest = spec.partition(":")
     if kind == "sim":
+        from posed.hal.motion import DEFAULT_SCRIPT, make_script
+        from posed.hal.simulated import SimulatedPhone
+
         if speed != 1.0:
             raise InvalidArgumentError(f"speed = {speed} with source {spec!r}; allowed: 1 (only a replay has a speed)")
         if seed < 0:
             raise InvalidArgumentError(f"seed = {seed}; allowed: 0 or more")
         return SimulatedPhone(profile, clock, make_script(rest or DEFAULT_SCRIPT, seed), seed)
     if kind == "replay" and rest:
-        # Imported only here: a simulated phone has no need of the recording formats.
         from posed.hal.replay import open_replay
 
         return open_replay(Path(rest), profile, clock, speed=speed, loop=loop)

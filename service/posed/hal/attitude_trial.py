@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
 from posed.errors import MissingExtraError, RecordingError
 from posed.events import EventColumn, Float64Array, SensorType
 from posed.hal.recording import Recording, TruthTrack, in_time_order, read_text
@@ -125,7 +126,7 @@ def _read_truth(folder: Path) -> TruthTrack:
     # Stored column-major, device to world. Read so, the phone's own rotation vector leans off it by 1 to 4 degrees
     # (median of a trial); read row by row, by 6 to 91.
     matrices = rotations.T.reshape(frames, 3, 3).transpose(0, 2, 1)
-    known: npt.NDArray[np.bool_] = np.isfinite(matrices).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(matrices).all(axis=(1, 2)), np.bool_)
     if not _are_rotations(matrices[known]):
         raise RecordingError(f"{path}: RigidBodies.Rotations are not all rotation matrices; copy it again")
     return TruthTrack(timestamp_ns, _quaternions(matrices, known), position_enu)

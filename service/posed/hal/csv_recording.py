@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+
 from posed.errors import RecordingError
 from posed.events import EventColumn, SensorType
 from posed.hal.recording import Recording, in_time_order, read_text

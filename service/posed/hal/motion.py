@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+
 from posed.errors import InvalidArgumentError
 from posed.events import Float64Array
 from posed.hal import rotation

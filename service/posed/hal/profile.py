@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
+
 from posed.errors import InvalidArgumentError, ProfileError
 from posed.events import SensorInfo, SensorType
 from posed.hal.calibration import Calibration

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+
 from posed.errors import RecordingError
 from posed.events import EventColumn, Float64Array, Int64Array, SensorType, Truth
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+
 from posed.clock import Clock, TimeMap
 from posed.errors import InvalidArgumentError, RecordingError
 from posed.events import EventBatch, EventColumn, SensorInfo, SensorType, Truth
@@ -98,9 +99,9 @@ class ReplaySource:
         return self._time_map
 
     @property
-    def exhausted(self) -> bool:
-        """True once the last sample of a replay that does not loop has been drained."""
-        return not self._loop and self._drained_ns >= self._recording.end_ns
+    def end_ns(self) -> int | None:
+        """Sample time of the recording's last sample, of whatever sensor; None if it loops."""
+        return None if self._loop else self._recording.end_ns
 
     def activate(self, handle: int, enabled: bool) -> None:
         """Switch a sensor on or off; the first on starts or resumes the replay, the last off pauses it.

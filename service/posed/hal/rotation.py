@@ -1,6 +1,7 @@
 """Rotations of many instants at once: unit quaternions (x, y, z, w) that map the device frame to the world."""
 
 import numpy as np
+
 from posed.events import Float64Array
 
 

@@ -5,6 +5,7 @@ from fractions import Fraction
 from math import cos, radians, sin
 
 import numpy as np
+
 from posed.events import Float64Array, Int64Array, SensorType
 from posed.hal import rotation
 from posed.hal.calibration import Calibration

@@ -3,6 +3,7 @@
 from bisect import bisect_right
 
 import numpy as np
+
 from posed.clock import Clock, TimeMap
 from posed.errors import InvalidArgumentError
 from posed.events import EventBatch, EventColumn, SensorInfo, SensorType, Truth
@@ -45,8 +46,8 @@ class SimulatedPhone:
         return TimeMap()
 
     @property
-    def exhausted(self) -> bool:
-        return False
+    def end_ns(self) -> None:
+        return None
 
     def activate(self, handle: int, enabled: bool) -> None:
         """Switch a sensor on, from now on, or off; a sensor never given a period runs at its fastest rate.

@@ -22,8 +22,8 @@ class SensorSource(Protocol):
         """The present mapping from sample time to CLOCK_BOOTTIME; it moves when a replay pauses or loops."""
 
     @property
-    def exhausted(self) -> bool:
-        """True once no further sample will ever come."""
+    def end_ns(self) -> int | None:
+        """Sample time of the last sample there will ever be, None for a source without end."""
 
     def activate(self, handle: int, enabled: bool) -> None:
         """Switch a sensor on or off; idempotent. Samples not drained when it goes off are abandoned."""

@@ -5,6 +5,7 @@ Both forms stand on one grid, `anchor + k / rate`, and depend only on column, ra
 
 import numpy as np
 import numpy.typing as npt
+
 from posed.events import EventColumn, Float64Array
 
 LONGEST_HOLD_NS = 500_000_000

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import TypeGuard
 
 import numpy as np
+
 from posed.errors import ProfileError
 from posed.events import Float64Array
 

@@ -90,7 +90,6 @@ class SensorService:
         self._pose_requests: dict[Hashable, _PoseRequest] = {}
         self._grids: dict[int, PoseGrid | None] = {}
         self._anchor_ns: int | None = None
-        self._newest_ns = 0
         self._now_ns = 0
         self._poses: list[Pose] = []
         self.events_fused = 0
@@ -217,12 +216,11 @@ class SensorService:
 
     def next_deadline_ns(self) -> int | None:
         """Return the CLOCK_BOOTTIME instant (ns) by which `advance` must run next, None if nothing is due."""
-        if self._source.exhausted:
-            return None
+        end_ns = self._source.end_ns
         due: list[int] = []
         for grid in self._grids.values():
             if grid is not None:
-                due.append(grid.next_ns)
+                due += [grid.next_ns] if end_ns is None or grid.next_ns <= end_ns else []
             else:
                 due += [t for t in map(self._source.next_sample_ns, self._inputs) if t is not None]
         for sensor in self._table.values():
@@ -230,7 +228,7 @@ class SensorService:
             if latency_ns is None:
                 continue
             if latency_ns:
-                due.append(sensor.release_ns)
+                due += [sensor.release_ns] if sensor.pending or not self._ended else []
             elif not sensor.is_virtual:
                 next_ns = self._source.next_sample_ns(sensor.info.handle)
                 if next_ns is not None:
@@ -264,6 +262,10 @@ class SensorService:
         return poses
 
     # Private
+
+    @property
+    def _ended(self) -> bool:
+        return self._source.end_ns is not None and self._now_ns >= self._source.end_ns
 
     def _sample_now_ns(self) -> int:
         return self._source.time_map.to_sample(self._clock.now_ns())
@@ -332,11 +334,9 @@ class SensorService:
         if not self._grids and not wants_virtual:
             return {}
         flat = batch.flat(self._inputs)
-        if len(flat):
-            self._newest_ns = int(flat.timestamp_ns[-1])
-            if self._anchor_ns is None:
-                self._anchor_ns = int(flat.timestamp_ns[0])
-                self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
+        if len(flat) and self._anchor_ns is None:
+            self._anchor_ns = int(flat.timestamp_ns[0])
+            self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
         started = self._clock.cpu_ns()
         done = 0
         virtual = VirtualEvents()
@@ -355,7 +355,7 @@ class SensorService:
     def _stops(self, flat: FlatEvents, wants_virtual: bool) -> list[tuple[int, int, PoseGrid | None]]:
         """Return (instant, row, grid) in time order: poses due (with a grid) and accelerometer events (without)."""
         # A recording that has ended moves no grid on: its last sample is the last thing known.
-        end_ns = min(self._now_ns, self._newest_ns) if self._source.exhausted else self._now_ns
+        end_ns = self._now_ns if self._source.end_ns is None else min(self._now_ns, self._source.end_ns)
         stops: list[tuple[int, int, PoseGrid | None]] = []
         for grid in self._grids.values():
             if grid is not None:
@@ -403,7 +403,7 @@ class SensorService:
         for sensor in self._table.values():
             if sensor.latency_ns == 0:
                 self._release(sensor)
-        if self._source.exhausted or any(
+        if self._ended or any(
             s.release_ns <= self._now_ns or s.pending_events >= s.info.fifo_max_event_count for s in batched
         ):
             for sensor in batched:

@@ -4,6 +4,7 @@ GravitySensor.cpp, LinearAccelerationSensor.cpp)."""
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+
 from posed.events import EventColumn, Float64Array, Orientation, SensorInfo, SensorType
 
 STANDARD_GRAVITY = 9.80665

@@ -1,0 +1,93 @@
+"""Short calls to the running daemon, which do not count as a binding."""
+
+import contextlib
+import math
+import os
+import socket
+import time
+from collections.abc import Iterator
+
+import zmq
+from posed.binder import sockets
+from posed.binder.connection import Connection
+from posed.binder.interface import interface_of
+from posed.binder.proxy import Proxy
+from posed.binder.runtime import control_path, endpoint, runtime_directory
+from posed.binder.status import DeadObjectError, TransactionTimeoutError
+from posed.errors import ServiceUnavailableError
+from posed.proto import sensors_pb2, service_manager_pb2
+
+# Of a daemon that lives, connecting takes 2 ms; a stopped or hung one is not worth a longer wait.
+_TIMEOUT_S = 2.0
+
+
+def daemon_listens() -> bool:
+    """Return whether a daemon stands at the control socket; taking its lock to find out could keep one from starting.
+
+    Raises RuntimeDirectoryError if the runtime directory is not safe to use.
+    """
+    path = control_path(runtime_directory(create=False))
+    endpoint(path)  # refuses a path that connect could only call too long
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC) as probe:
+        probe.setblocking(False)
+        try:
+            probe.connect(os.fspath(path))
+        except (FileNotFoundError, ConnectionRefusedError):
+            return False
+        except BlockingIOError:
+            pass  # a daemon that accepts nobody at the moment
+    return True
+
+
+def require_daemon() -> None:
+    """Raise ServiceUnavailableError with the remedy if no daemon runs."""
+    if not daemon_listens():
+        raise ServiceUnavailableError("no daemon is running; start one with 'posed start'")
+
+
+@contextlib.contextmanager
+def connect() -> Iterator[Connection]:
+    """Yield a connection to the running daemon.
+
+    Raises ServiceUnavailableError if there is none or it does not answer, then or during a call inside the block.
+    """
+    require_daemon()
+    context = sockets.context()
+    connection = Connection(control_path(runtime_directory()), context)
+    try:
+        _await_connected(connection)
+        yield connection
+    except (DeadObjectError, TransactionTimeoutError) as error:
+        raise ServiceUnavailableError(str(error)) from error
+    finally:
+        connection.close()
+        context.destroy(linger=0)
+
+
+def service_manager(connection: Connection) -> Proxy:
+    """Return the daemon's IServiceManager."""
+    descriptor = service_manager_pb2.DESCRIPTOR.services_by_name["IServiceManager"]
+    return connection.proxy(descriptor, "servicemanager", _TIMEOUT_S)
+
+
+def sensor_service(connection: Connection) -> Proxy:
+    """Return the daemon's ISensorService; raises RemoteError if this client and the daemon do not fit together."""
+    descriptor = sensors_pb2.DESCRIPTOR.services_by_name["ISensorService"]
+    service_manager(connection).getService(
+        service_manager_pb2.GetServiceRequest(name="sensorservice", interface=interface_of(descriptor).info)
+    )
+    return connection.proxy(descriptor, "sensorservice", _TIMEOUT_S)
+
+
+def _await_connected(connection: Connection) -> None:
+    poller = zmq.Poller()
+    for each in connection.sockets:
+        poller.register(each, zmq.POLLIN)
+    deadline = time.monotonic() + _TIMEOUT_S
+    connection.process()
+    while not connection.connected:
+        remaining = deadline - time.monotonic()
+        if remaining <= 0:
+            raise ServiceUnavailableError("the daemon is there but does not answer; it is stopped, hung or overloaded")
+        poller.poll(math.ceil(remaining * 1000))
+        connection.process()

@@ -1,0 +1,95 @@
+"""`posed fuse`: a recording into poses, as CSV."""
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+from posed.cli.options import add_filter_option, add_pose_rate_option, add_profile_option, add_rate_mode_option
+from posed.errors import InvalidArgumentError
+from posed.evaluation.fuse import fuse_recording
+from posed.events import Pose, RateMode
+from posed.hal.profile import load_profile
+from posed.hal.replay import load_recording
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+HEADER = "sequence,timestamp_ns,qx,qy,qz,qw,wx,wy,wz,heading_accuracy_rad,status,rate_mode,events_fused,filter"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the recording and how to fuse it."""
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help="a FILE.csv or the folder of a trial")
+    add_rate_mode_option(parser)
+    add_filter_option(parser, "dcm")
+    add_profile_option(parser, "patonis2018")
+    add_pose_rate_option(parser)
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="where the CSV goes (default: stdout)")
+    parser.epilog = f"""\
+Columns: {HEADER.replace(",", ", ")}.
+q is device to world (east, magnetic north, up), w in rad/s in device axes, status the bits of a pose's status. The
+same recording and options give the same bytes."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fuse as fast as it goes."""
+    recording = load_recording(arguments.recording)
+    for kind, count in recording.dropped_rows.items():
+        if count:
+            print(f"posed: note: {count} {kind.name.lower()} rows out of time order are left out", file=sys.stderr)
+    poses = fuse_recording(
+        recording,
+        load_profile(arguments.profile),
+        sampling_period_us=RateMode[arguments.mode].sampling_period_us,
+        filter_name=arguments.filter,
+        pose_period_us=round(1e6 / arguments.rate),
+    )
+    written = 0
+    with _output(arguments.output) as output, _progress(output) as progress:
+        bar = progress.add_task(recording.name, total=recording.end_ns - recording.start_ns)
+        output.write(f"{HEADER}\n")
+        for pose in poses:
+            output.write(csv_row(pose))
+            written += 1
+            progress.update(bar, completed=pose.instant_ns - recording.start_ns)
+    if arguments.output is not None:
+        print(f"{written} poses written to {arguments.output}", file=sys.stderr)
+    return 0
+
+
+def csv_row(pose: Pose) -> str:
+    """Return a pose as a line of CSV; repr is the shortest text from which the same float is read."""
+    orientation = pose.orientation
+    numbers = (*orientation.quaternion, *orientation.angular_rate, orientation.heading_accuracy)
+    return (
+        f"{pose.sequence},{orientation.timestamp_ns},{','.join(map(repr, numbers))},{int(orientation.status)},"
+        f"{pose.rate_mode.name},{pose.events_fused},{pose.filter_name}\n"
+    )
+
+
+@contextlib.contextmanager
+def _output(path: Path | None) -> Iterator[TextIO]:
+    if path is None:
+        yield sys.stdout
+        return
+    try:
+        file = path.open("w", encoding="ascii", newline="\n")
+    except OSError as error:
+        raise InvalidArgumentError(f"cannot write {path}: {error.strerror}; name a file that can be written") from error
+    with file:
+        yield file
+
+
+def _progress(output: TextIO) -> Progress:
+    """Return a progress bar on stderr, silent unless that is a terminal that the poses do not fill."""
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        disable=not sys.stderr.isatty() or output.isatty(),
+        transient=True,
+    )

@@ -1,0 +1,1 @@
+"""What `posed profile` measures, and how it is shown."""

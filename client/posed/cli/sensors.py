@@ -1,0 +1,79 @@
+"""`posed sensors`: the sensor list."""
+
+import argparse
+import json
+from dataclasses import asdict
+
+from posed.cli.connection import require_daemon
+from posed.client import Sensor, SensorManager
+from rich.console import Console
+from rich.table import Table
+
+_UNITS = {
+    Sensor.TYPE_ACCELEROMETER: "m/s²",
+    Sensor.TYPE_ACCELEROMETER_UNCALIBRATED: "m/s²",
+    Sensor.TYPE_GRAVITY: "m/s²",
+    Sensor.TYPE_LINEAR_ACCELERATION: "m/s²",
+    Sensor.TYPE_GYROSCOPE: "rad/s",
+    Sensor.TYPE_GYROSCOPE_UNCALIBRATED: "rad/s",
+    Sensor.TYPE_MAGNETIC_FIELD: "µT",
+    Sensor.TYPE_MAGNETIC_FIELD_UNCALIBRATED: "µT",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add --json."""
+    parser.add_argument("--json", action="store_true", help="one JSON array")
+    parser.epilog = """\
+Keys of --json, as android.hardware.Sensor has them: handle, type, string_type, name, vendor, version, maximum_range,
+resolution, power (mA), min_delay and max_delay (us), fifo_reserved_event_count, fifo_max_event_count, reporting_mode
+(0 continuous), is_wake_up_sensor."""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the sensors of the running daemon."""
+    require_daemon()
+    with SensorManager() as manager:
+        sensors = manager.get_sensor_list()
+    if arguments.json:
+        print(json.dumps([asdict(sensor) for sensor in sensors], indent=2))
+    else:
+        Console(highlight=False, markup=False).print(_table(sensors))
+    return 0
+
+
+def short_name(sensor: Sensor) -> str:
+    """Return a sensor's string type without android.sensor, such as gyroscope."""
+    return sensor.string_type.removeprefix("android.sensor.")
+
+
+def unit(sensor: Sensor) -> str:
+    """Return the unit of a sensor's values, empty for the rotation vector."""
+    return _UNITS.get(sensor.type, "")
+
+
+def _table(sensors: list[Sensor]) -> Table:
+    table = Table(box=None, padding=(0, 1, 0, 0), header_style="dim")
+    table.add_column("#", justify="right")
+    table.add_column("type", no_wrap=True)
+    table.add_column("name, vendor")
+    table.add_column("range")
+    table.add_column("Hz", justify="right", no_wrap=True)
+    table.add_column("mA", justify="right")
+    table.add_column("FIFO", justify="right")
+    for sensor in sensors:
+        table.add_row(
+            str(sensor.handle),
+            short_name(sensor),
+            f"{sensor.name}, {sensor.vendor}",
+            f"{sensor.maximum_range:.4g} {unit(sensor)}",
+            _rates(sensor),
+            f"{sensor.power:g}",
+            str(sensor.fifo_max_event_count),
+        )
+    return table
+
+
+def _rates(sensor: Sensor) -> str:
+    fastest = f"{1e6 / sensor.min_delay:.4g}" if sensor.min_delay else "?"
+    return f"{1e6 / sensor.max_delay:.3g}-{fastest}" if sensor.max_delay else fastest

@@ -1,0 +1,116 @@
+"""`posed watch`: the fused pose as it comes, drawn, as lines, or as JSON."""
+
+import argparse
+import select
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+
+import posed.client as sdk
+from posed.cli.live_view import LiveView
+from posed.cli.options import add_pose_rate_option, add_rate_mode_option, positive_count
+from posed.cli.pose_text import JSON_KEYS, pose_json, pose_line
+from posed.client import Pose, PoseClient, ServiceState
+from posed.client.pose import boot_time_ns
+from rich.console import Console
+from rich.live import Live
+
+# How often the view is drawn though nothing came, so that the age and the state stay true.
+_TICK_S = 0.25
+# A frame takes 4 ms to draw; poses can come at 200 Hz.
+_FRAME_S = 0.1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what to ask for and how to show it."""
+    add_rate_mode_option(parser)
+    add_pose_rate_option(parser)
+    parser.add_argument("--json", action="store_true", help="one JSON object a line")
+    parser.add_argument("--count", type=positive_count, metavar="N", help="end after N poses")
+    parser.epilog = f"""\
+Waits while no daemon is there and goes on when it returns. Where stdout is no terminal, each pose is a line.
+
+Keys of --json:
+{JSON_KEYS}"""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show poses until Ctrl-C, --count or the end of the reader."""
+    rate_mode = getattr(sdk, f"SENSOR_DELAY_{arguments.mode}")
+    exit_on_signals()
+    view = LiveView()
+    try:
+        with PoseClient(
+            rate_mode, pose_rate_hz=arguments.rate, every=True, on_service_connected=view.count_connection
+        ) as client:
+            if arguments.json:
+                print_poses(client, pose_json, count=arguments.count)
+            elif sys.stdout.isatty():
+                draw_poses(client, view, count=arguments.count)
+            else:
+                print_poses(client, pose_line, count=arguments.count)
+    except KeyboardInterrupt:
+        pass
+    return 0
+
+
+def exit_on_signals() -> None:
+    """Have SIGTERM and SIGHUP unwind the stack, so that the terminal gets its cursor back and what was made goes."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda number, _frame: sys.exit(128 + number))
+
+
+def draw_poses(client: PoseClient, view: LiveView, *, count: int | None = None, seconds: float | None = None) -> None:
+    """Draw the view on the terminal until `count` poses or `seconds` have passed."""
+
+    def picture() -> None:
+        live.update(view.render(client.state, client.reason, boot_time_ns()), refresh=True)
+
+    with Live(console=Console(), auto_refresh=False) as live:
+        next_frame = 0.0
+        for pose in _poses(client, count, seconds):
+            if pose is not None:
+                view.add(pose)
+            now = time.monotonic()
+            if pose is None or now >= next_frame:
+                picture()
+                next_frame = now + _FRAME_S
+        picture()
+
+
+def print_poses(
+    client: PoseClient,
+    text_of: Callable[[Pose], str],
+    *,
+    count: int | None = None,
+    seconds: float | None = None,
+) -> None:
+    """Print each pose as a line until `count` poses or `seconds` have passed or the reader goes.
+
+    What happens to the daemon is told on stderr.
+    """
+    reader = select.poll()
+    reader.register(sys.stdout, 0)
+    told = ServiceState.CONNECTED
+    for pose in _poses(client, count, seconds):
+        if client.state is not told:
+            told = client.state
+            print(f"posed: {client.reason or told.value}", file=sys.stderr)
+        if pose is not None:
+            print(text_of(pose), flush=True)
+        elif reader.poll(0):
+            return  # a pipe without its reader would only be noticed at the next pose
+
+
+def _poses(client: PoseClient, count: int | None, seconds: float | None) -> Iterator[Pose | None]:
+    """Yield each pose, and None whenever nothing came for a while."""
+    end = None if seconds is None else time.monotonic() + seconds
+    received = 0
+    while received != count:
+        wait_s = _TICK_S if end is None else min(_TICK_S, end - time.monotonic())
+        if wait_s <= 0:
+            return
+        pose = client.next_pose(wait_s)
+        yield pose
+        received += pose is not None

@@ -1,0 +1,1 @@
+"""How good a pose is: recordings with truth, error measures, reports."""

@@ -1,0 +1,90 @@
+"""The simulated tablet of Patonis et al. 2018 through the whole pipeline, against its own truth."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from posed.clock import VirtualClock
+from posed.evaluation.measures import heading_error, to_magnetic_north, total_error
+from posed.events import Pose, RateMode
+from posed.fusion import SensorNoise, make_filter
+from posed.hal import open_source
+from posed.hal.profile import load_profile
+from posed.sensors import SensorService
+
+_SECTION_S = 5
+_HOLD_S = 4
+
+
+class _Run:
+    """A simulated phone under one script, its poses and their errors in degrees."""
+
+    def __init__(self, script: str, mode: RateMode, seed: int) -> None:
+        profile = load_profile("patonis2018")
+        noise = profile.noise
+        self._clock = VirtualClock(1_000_000_000)
+        self._start_ns = self._clock.now_ns()
+        self._source = open_source(f"sim:{script}", profile, self._clock, seed=seed)
+        sigmas = SensorNoise(noise.gyroscope_density, noise.accelerometer_std, noise.magnetic_field_std)
+        self._service = SensorService(self._source, make_filter("dcm", sigmas), self._clock)
+        self.set_mode(mode)
+
+    def set_mode(self, mode: RateMode) -> None:
+        self._service.register_pose("test", 100_000, mode.sampling_period_us)
+
+    def poses(self, seconds: float) -> Iterator[tuple[float, Pose]]:
+        """Yield (seconds since the start, pose) of the next seconds."""
+        self._clock.advance_to(self._clock.now_ns() + int(seconds * 1e9))
+        self._service.advance()
+        for pose in self._service.take_poses():
+            yield (pose.instant_ns - self._start_ns) / 1e9, pose
+
+    def pair(self, pose: Pose) -> tuple[np.ndarray, np.ndarray]:
+        truth = self._source.truth(pose.orientation.timestamp_ns)
+        assert truth is not None
+        true = to_magnetic_north(np.array([truth.quaternion]), truth.declination)
+        return np.array([pose.orientation.quaternion]), true
+
+    def total_deg(self, pose: Pose) -> float:
+        return math.degrees(float(total_error(*self.pair(pose))[0]))
+
+    def heading_deg(self, pose: Pose) -> float:
+        return math.degrees(float(heading_error(*self.pair(pose))[0]))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("mode", [RateMode.GAME, RateMode.FASTEST])
+@pytest.mark.parametrize("script", ["turn-x", "turn-y", "turn-z"])
+def test_each_of_the_24_orientations_of_table_3_is_found_through_the_singular_ones(
+    script: str, mode: RateMode, seed: int
+) -> None:
+    run = _Run(script, mode, seed)
+    held: dict[int, list[float]] = {}
+    for seconds, pose in run.poses(8 * _SECTION_S):
+        error = run.total_deg(pose)
+        assert error < 5.0, f"flipped at {seconds} s"
+        section, into = divmod(seconds, _SECTION_S)
+        if 3.0 <= into <= _HOLD_S:
+            held.setdefault(int(section), []).append(error)
+    assert len(held) == 8
+    assert max(max(errors) for errors in held.values()) <= 1.5
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_changing_the_mode_live_takes_effect_within_a_second_and_makes_no_heading_jump(seed: int) -> None:
+    run = _Run("look-around", RateMode.NORMAL, seed)
+    before = [pose for _, pose in run.poses(10)][-1]
+    for mode in (RateMode.FASTEST, RateMode.UI, RateMode.GAME, RateMode.NORMAL):
+        run.set_mode(mode)
+        changed = [pose for _, pose in run.poses(1)]
+        assert changed[-1].rate_mode is mode
+        for pose in changed:
+            # The phone moves meanwhile: a jump is a change of the error, not of the heading.
+            assert abs(run.heading_deg(pose) - run.heading_deg(before)) <= 0.5
+            before = pose
+        settled = [pose for _, pose in run.poses(4)]
+        events = sum(pose.events_fused for pose in settled) / 4
+        assert events == pytest.approx({"NORMAL": 25, "UI": 45, "GAME": 150, "FASTEST": 350}[mode.name], rel=0.05)
+        before = settled[-1]
