@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import zmq
+
 from posed.binder import sockets
 from posed.binder.connection import Connection
 from posed.binder.interface import check_version, interface_of

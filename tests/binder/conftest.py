@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from binder_harness import ServerThread, get_service, pump
+
 from posed.binder import sockets
 from posed.binder.connection import Connection
 

@@ -21,6 +21,7 @@ from binder_harness import (
     pump,
     spawn,
 )
+
 from posed.binder.connection import Connection
 from posed.binder.interface import interface_of
 from posed.binder.parcel import MAX_PARCEL_BYTES

@@ -22,8 +22,10 @@ from binder_harness import (
     pump,
     spawn,
 )
+
 from posed.binder import sockets
 from posed.binder.connection import Connection
+from posed.binder.server import Server
 from posed.binder.status import DeadObjectError
 from posed.proto import binder_pb2, sensors_pb2, service_manager_pb2
 
@@ -107,6 +109,21 @@ def test_dead_peer_takes_no_call(server: ServerThread, connection: Connection) -
     connection.close()
     server.wait_until(lambda _: not peer.alive)
     assert server.do(lambda _: listener.onSensorEvents(events(1))) is False
+
+
+def test_first_words_may_be_read_before_word_of_the_connection(server: ServerThread) -> None:
+    def speak(inner: Server) -> RawClient:
+        client = RawClient(server.path)
+        client.send(bind_call(1))
+        assert inner.sockets[0].poll(int(PATIENCE_S * 1000))
+        inner._read_parcels()
+        return client
+
+    client = server.do(speak)
+    assert client.receive_frame()[0] == 0
+    assert len(server.peers()) == 1
+    client.close()
+    assert server.manager.died.get(timeout=PATIENCE_S)
 
 
 def test_words_of_the_dead_make_no_peer(server: ServerThread) -> None:

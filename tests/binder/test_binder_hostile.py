@@ -25,6 +25,7 @@ from binder_harness import (
 )
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
 from posed.binder import sockets
 from posed.binder.connection import Connection
 from posed.binder.interface import interface_of

@@ -11,6 +11,7 @@ import pytest
 import zmq
 from google.protobuf.descriptor import ServiceDescriptor
 from google.protobuf.internal import api_implementation
+
 from posed.binder import sockets
 from posed.binder.interface import FIRST_CALL, INTERFACE_HASH, INTERFACE_VERSION, PING, check_version, interface_of
 from posed.binder.status import ExceptionCode, RemoteError
@@ -96,8 +97,8 @@ def test_every_socket_is_bounded_in_queue_size_and_patience(context: sockets.Con
         assert option(zmq.MAXMSGSIZE) == 128 * 1024
         assert 0 <= option(zmq.LINGER) <= 200
         assert option(zmq.HEARTBEAT_IVL) == 700
-        assert option(zmq.HEARTBEAT_TIMEOUT) == 1400
-        assert option(zmq.HEARTBEAT_TTL) == 1400
+        assert option(zmq.HEARTBEAT_TIMEOUT) == 1200
+        assert option(zmq.HEARTBEAT_TTL) == 1200
         assert option(zmq.HANDSHAKE_IVL) == 500
     for socket in made[1], made[3], made[4]:
         assert socket.getsockopt(zmq.RECONNECT_IVL) == 100

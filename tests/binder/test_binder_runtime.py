@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import zmq
+
 from posed.binder import sockets
 from posed.binder.connection import Connection
 from posed.binder.runtime import (

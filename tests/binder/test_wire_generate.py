@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from binder_harness import RawClient, ServerThread
+
 from posed.binder.interface import interface_of
 from posed.proto import binder_pb2, events_pb2, pose_pb2, sensors_pb2, service_manager_pb2
 

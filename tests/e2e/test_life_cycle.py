@@ -58,7 +58,7 @@ def test_start_makes_a_bound_daemon_stay_and_stop_lets_it_go_after_the_last_unbi
     with PoseClient(auto_create=True) as client:
         client.wait_connected(5)
         stopped = desk.posed("stop")
-        assert (stopped.returncode, "1" in stopped.stdout) == (0, True)
+        assert (stopped.returncode, "1 bound client" in stopped.stderr) == (1, True)
         assert client.next_pose(timeout_s=5) is not None
         assert _runs(pid)
     eventually(lambda: not _runs(pid))

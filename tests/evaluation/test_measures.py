@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from posed.errors import InvalidArgumentError
 from posed.evaluation.measures import (
     heading_error,

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+
 from posed.events import FlatEvents, Float64Array, SensorType
 from posed.fusion.dcm import DcmFilter
 

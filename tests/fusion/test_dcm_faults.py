@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-from posed.events import FilterStatus, FlatEvents, Float64Array, Orientation, SensorType
-from posed.fusion.dcm import DcmFilter, DcmParams
-from posed.fusion.gate import GateParams
 from synthetic_phone import (
     FASTEST,
     FIELD,
@@ -17,6 +14,10 @@ from synthetic_phone import (
     sense,
     without,
 )
+
+from posed.events import FilterStatus, FlatEvents, Float64Array, Orientation, SensorType
+from posed.fusion.dcm import DcmFilter, DcmParams
+from posed.fusion.gate import GateParams
 
 LYING: Attitude = lambda t: np.eye(3)  # noqa: E731
 MAGNET = np.array([60.0, 0.0, 0.0])

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from synthetic_phone import FASTEST, GAME, NORMAL, Attitude, error_deg, rotation, sense, without
+
 from posed.events import FilterStatus, FlatEvents, Float64Array, SensorType
 from posed.fusion.dcm import DcmFilter, DcmParams
 from posed.fusion.rest import RestParams
-from synthetic_phone import FASTEST, GAME, NORMAL, Attitude, error_deg, rotation, sense, without
 
 LYING: Attitude = lambda t: np.eye(3)  # noqa: E731
 

@@ -4,9 +4,10 @@ import itertools
 
 import numpy as np
 import pytest
+from synthetic_phone import FIELD, GRAVITY, error_deg, matrix, rotation, rotation_vector, sense
+
 from posed.events import FilterStatus, Float64Array, SensorType
 from posed.fusion.dcm import DcmFilter
-from synthetic_phone import FIELD, GRAVITY, error_deg, matrix, rotation, rotation_vector, sense
 
 HALF = np.sqrt(0.5)
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from synthetic_phone import FASTEST, GAME, rotation, sense
+
 from posed.errors import InvalidArgumentError
 from posed.events import FlatEvents, SensorType
 from posed.fusion.dcm import DcmFilter, DcmState
-from synthetic_phone import FASTEST, GAME, rotation, sense
 
 KINDS = np.array([SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD, SensorType.GYROSCOPE], np.int64)
 

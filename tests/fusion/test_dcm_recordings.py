@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from posed.evaluation.measures import nearest_truth, rmse, to_magnetic_north, total_error
 from posed.events import FlatEvents, Float64Array, Int64Array, SensorType
 from posed.fusion.dcm import DcmFilter

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+
 from posed.errors import InvalidArgumentError
 from posed.fusion import FILTERS, SensorNoise, make_filter
 from posed.fusion.dcm import DcmFilter, DcmParams

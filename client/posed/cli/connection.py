@@ -2,8 +2,6 @@
 
 import contextlib
 import math
-import os
-import socket
 import time
 from collections.abc import Iterator
 
@@ -12,31 +10,14 @@ from posed.binder import sockets
 from posed.binder.connection import Connection
 from posed.binder.interface import interface_of
 from posed.binder.proxy import Proxy
-from posed.binder.runtime import control_path, endpoint, runtime_directory
+from posed.binder.runtime import control_path, runtime_directory
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
+from posed.client.launcher import daemon_listens
 from posed.errors import ServiceUnavailableError
 from posed.proto import sensors_pb2, service_manager_pb2
 
 # Of a daemon that lives, connecting takes 2 ms; a stopped or hung one is not worth a longer wait.
 _TIMEOUT_S = 2.0
-
-
-def daemon_listens() -> bool:
-    """Return whether a daemon stands at the control socket; taking its lock to find out could keep one from starting.
-
-    Raises RuntimeDirectoryError if the runtime directory is not safe to use.
-    """
-    path = control_path(runtime_directory(create=False))
-    endpoint(path)  # refuses a path that connect could only call too long
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC) as probe:
-        probe.setblocking(False)
-        try:
-            probe.connect(os.fspath(path))
-        except (FileNotFoundError, ConnectionRefusedError):
-            return False
-        except BlockingIOError:
-            pass  # a daemon that accepts nobody at the moment
-    return True
 
 
 def require_daemon() -> None:

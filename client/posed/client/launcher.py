@@ -7,12 +7,13 @@ import select
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from posed.binder import runtime
-from posed.errors import AlreadyRunningError, ServiceUnavailableError
+from posed.errors import ServiceUnavailableError
 
 _READY_TIMEOUT_S = 10.0
 _LOG_NAME = "daemon.log"
@@ -25,23 +26,28 @@ def ensure_daemon(arguments: Sequence[str] = ("--bound",)) -> bool:
     """
     directory = runtime.runtime_directory()
     with _start_lock(directory):
-        if daemon_runs(directory):
+        if daemon_listens():
             return False
         _start(directory, arguments)
         return True
 
 
-def daemon_runs(directory: Path) -> bool:
-    """Return whether a daemon holds the runtime directory."""
-    if not directory.exists():
-        return False
-    lock = runtime.InstanceLock(directory)
-    try:
-        lock.acquire()
-    except AlreadyRunningError:
-        return True
-    lock.release()
-    return False
+def daemon_listens() -> bool:
+    """Return whether a daemon stands at the control socket; taking its lock to find out could keep one from starting.
+
+    Raises RuntimeDirectoryError if the runtime directory is not safe to use.
+    """
+    path = runtime.control_path(runtime.runtime_directory(create=False))
+    runtime.endpoint(path)  # refuses a path that connect could only call too long
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_CLOEXEC) as probe:
+        probe.setblocking(False)
+        try:
+            probe.connect(os.fspath(path))
+        except (FileNotFoundError, ConnectionRefusedError):
+            return False
+        except BlockingIOError:
+            pass  # a daemon that accepts nobody at the moment
+    return True
 
 
 @contextlib.contextmanager
@@ -97,6 +103,18 @@ def _await_ready(ready: socket.socket, alive: int, log_path: Path) -> None:
         if ready.fileno() in readable and b"READY=1" in ready.recv(256).split(b"\n"):
             return
         if alive in readable:
+            if _another_came_first():
+                return
             said = log_path.read_text(errors="replace").strip().splitlines()
             raise ServiceUnavailableError(f"the daemon did not start: {said[-1] if said else 'it said nothing'}")
     raise ServiceUnavailableError(f"the daemon was not ready after {_READY_TIMEOUT_S:.0f} s; its log is {log_path}")
+
+
+def _another_came_first() -> bool:
+    """Return whether a daemon started by somebody else took the place meanwhile; it may still be on its way."""
+    pause = threading.Event()
+    for _ in range(20):
+        if daemon_listens():
+            return True
+        pause.wait(0.05)
+    return False

@@ -12,6 +12,7 @@ from pathlib import Path
 import zmq
 from google.protobuf.descriptor import ServiceDescriptor
 from google.protobuf.message import DecodeError
+
 from posed.binder.interface import PING, interface_of
 from posed.binder.parcel import encode_transaction
 from posed.binder.peer import Peer

@@ -9,6 +9,7 @@ from typing import Any
 from google.protobuf.descriptor import FileDescriptor, MethodDescriptor, ServiceDescriptor
 from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
+
 from posed.binder.status import ExceptionCode, RemoteError
 from posed.proto import binder_pb2
 

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable
 
 from google.protobuf.descriptor import ServiceDescriptor
+
 from posed.binder.interface import interface_of
 from posed.binder.parcel import encode_transaction
 from posed.binder.proxy import Proxy

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from google.protobuf.message import Message
+
 from posed.binder.interface import INTERFACE_HASH, INTERFACE_VERSION, Interface, Method
 from posed.proto.binder_pb2 import InterfaceInfo
 

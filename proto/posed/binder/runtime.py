@@ -8,6 +8,7 @@ import tempfile
 from pathlib import Path
 
 import zmq
+
 from posed.errors import AlreadyRunningError, RuntimeDirectoryError
 
 

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import zmq
 from google.protobuf.message import DecodeError
+
 from posed.binder.interface import interface_of
 from posed.binder.parcel import MAX_PARCEL_BYTES, encode_reply
 from posed.binder.peer import Peer

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 
 from google.protobuf.descriptor import ServiceDescriptor
 from google.protobuf.message import DecodeError
+
 from posed.binder.interface import INTERFACE_HASH, INTERFACE_VERSION, PING, Interface, Method, interface_of
 from posed.binder.peer import Peer
 from posed.binder.status import ExceptionCode, RemoteError, status_of

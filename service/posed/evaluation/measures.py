@@ -6,6 +6,7 @@ is not known is NaN, and so is then the error.
 
 import numpy as np
 import numpy.typing as npt
+
 from posed.errors import InvalidArgumentError
 from posed.events import Float64Array, Int64Array
 

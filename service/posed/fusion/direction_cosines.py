@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import cos, sin, sqrt
 
 
-@dataclass(slots=True)
+@dataclass
 class DirectionCosines:
     """The rotation matrix from device to world (ENU) by rows: east, north and up in device axes."""
 

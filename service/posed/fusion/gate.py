@@ -36,7 +36,7 @@ class GateParams:
         require_positive(self)
 
 
-@dataclass(slots=True)
+@dataclass
 class GateState:
     """Reference and candidate field (uT, dip in rad, seconds each was learnt from), and how long rejection lasts."""
 

@@ -40,7 +40,7 @@ class RestParams:
         require_positive(self)
 
 
-@dataclass(slots=True)
+@dataclass
 class RestState:
     """Running means (rad/s, m/s2), how long nothing moved, and the bias (rad/s, one variance for the three axes)."""
 

@@ -11,7 +11,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 
-from posed.cli.connection import connect, daemon_listens, sensor_service, service_manager
+from posed.cli.connection import connect, sensor_service, service_manager
+from posed.client.launcher import daemon_listens
 from posed.errors import ServiceUnavailableError
 from posed.proto import binder_pb2, sensors_pb2
 

@@ -116,7 +116,7 @@ def as_json(report: Report) -> dict[str, Any]:
     modes = {}
     for mode, each in report.modes.items():
         sensor_hz = {
-            name: {key: _rounded(value) for key, value in asdict(hz).items()} for name, hz in each.sensor_hz.items()
+            name: {key: _rounded(value, 3) for key, value in asdict(hz).items()} for name, hz in each.sensor_hz.items()
         }
         modes[mode] = {"sensor_hz": sensor_hz, **_figures(each)}
     return {"modes": modes, "idle": _figures(report.idle), "machine": dict(report.machine)}
@@ -214,8 +214,8 @@ def _figures(report: ModeReport | IdleReport) -> dict[str, Any]:
     return {**figures, "spread": spreads}
 
 
-def _rounded(value: float | None) -> float | None:
-    return None if value is None else round(value, 4)
+def _rounded(value: float | None, digits: int = 4) -> float | None:
+    return None if value is None else round(value, digits)
 
 
 def _cpu_model() -> str:

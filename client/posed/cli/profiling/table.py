@@ -49,8 +49,8 @@ def notes(report: Report) -> list[str]:
     lines = [
         "Hz: asked > configured > measured at a client. CPU: percent of one core, idle subtracted. Figures: median"
         " (spread = largest - smallest); ~ no further from the mode to the left than the spread.",
-        f"idle, without our client: {_value(idle.daemon_cpu_percent, 3)} % CPU, {_value(idle.wakeups_per_s, 1)} wake-ups/s,"
-        f" {idle.rss_mb.median:.1f} MB.",
+        f"idle, without our client: {_value(idle.daemon_cpu_percent, 3)} % CPU,"
+        f" {_value(idle.wakeups_per_s, 1)} wake-ups/s, {idle.rss_mb.median:.1f} MB.",
         f"{PAPER_CAPTION}.",
         f"machine: {machine['cpu_model']}, {machine['cores']} cores, Linux {machine['kernel']}, Python"
         f" {machine['python']}, libzmq {machine['libzmq']}, protobuf {machine['protobuf']}.",
