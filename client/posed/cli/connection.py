@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 
 import zmq
+
 from posed.binder import sockets
 from posed.binder.connection import Connection
 from posed.binder.interface import interface_of
@@ -69,6 +70,9 @@ def _await_connected(connection: Connection) -> None:
     while not connection.connected:
         remaining = deadline - time.monotonic()
         if remaining <= 0:
-            raise ServiceUnavailableError("the daemon is there but does not answer; it is stopped, hung or overloaded")
+            raise ServiceUnavailableError(
+                "the daemon is there but does not answer: it is stopped, hung or overloaded; its process id is in"
+                f" {runtime_directory() / 'daemon.lock'}"
+            )
         poller.poll(math.ceil(remaining * 1000))
         connection.process()

@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from posed.binder.runtime import runtime_directory
 from posed.cli.live_view import LiveView
 from posed.cli.options import positive_seconds
 from posed.cli.pose_text import pose_line
 from posed.cli.watch import draw_poses, exit_on_signals, print_poses
 from posed.client import PoseClient
-from posed.client.launcher import daemon_runs, ensure_daemon
+from posed.client.launcher import daemon_listens, ensure_daemon
 
 _SECONDS_OFF_TERMINAL = 10.0
 # A daemon without a client ends within milliseconds; it is looked for until then, so that nothing is left behind.
@@ -63,11 +62,11 @@ def _private_runtime_directory() -> Iterator[None]:
     try:
         yield
     finally:
-        _await_end(runtime_directory())
+        _await_end()
         shutil.rmtree(made, ignore_errors=True)
 
 
-def _await_end(directory: Path) -> None:
+def _await_end() -> None:
     deadline = time.monotonic() + _END_TIMEOUT_S
-    while daemon_runs(directory) and time.monotonic() < deadline:
+    while daemon_listens() and time.monotonic() < deadline:
         time.sleep(0.02)

@@ -7,14 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
 from posed.cli.options import add_filter_option, add_pose_rate_option, add_profile_option, add_rate_mode_option
 from posed.errors import InvalidArgumentError
 from posed.evaluation.fuse import fuse_recording
 from posed.events import Pose, RateMode
 from posed.hal.profile import load_profile
 from posed.hal.replay import load_recording
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 HEADER = "sequence,timestamp_ns,qx,qy,qz,qw,wx,wy,wz,heading_accuracy_rad,status,rate_mode,events_fused,filter"
 

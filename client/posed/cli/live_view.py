@@ -3,15 +3,17 @@
 import math
 from collections import deque
 
-from posed.cli.pose_text import bearing_deg, status_words, wind
-from posed.client import Pose, PoseStatus, Position, ServiceState
 from rich.console import Group, RenderableType
 from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-_WIDTH = 80
-_GAUGE = 49
+from posed.cli.pose_text import bearing_deg, status_words, wind
+from posed.client import Pose, PoseStatus, Position, ServiceState
+
+MAX_WIDTH = 80
+# What stands left of a gauge, and the frame.
+_BESIDE_GAUGE = 31
 _TAPE_DEG_A_CELL = 4
 _RATE_WINDOW_NS = 3_000_000_000
 _STALE_NS = 500_000_000
@@ -50,21 +52,27 @@ class LiveView:
             return None
         return (len(self._published_ns) - 1) * 1e9 / (self._published_ns[-1] - self._published_ns[0])
 
-    def render(self, state: ServiceState, reason: str, now_ns: int) -> RenderableType:
-        """Return the picture at `now_ns` (CLOCK_BOOTTIME)."""
+    def render(self, state: ServiceState, reason: str, now_ns: int, width: int = MAX_WIDTH) -> RenderableType:
+        """Return the picture at `now_ns` (CLOCK_BOOTTIME), `width` cells wide but never more than MAX_WIDTH."""
+        width = min(width, MAX_WIDTH)
         pose = self._pose
         color, news = self._news(state, reason, now_ns)
         headline = Text(news, style=f"bold {color}", overflow="fold")
         parts: list[RenderableType] = [headline]
         if pose is not None:
             live = state is ServiceState.CONNECTED and now_ns - pose.delivery.published_ns <= _STALE_NS
-            parts += [Text(), _attitude(pose, live), Text(), self._figures(pose, now_ns, live)]
+            parts += [
+                Text(),
+                _attitude(pose, live, max(1, width - _BESIDE_GAUGE)),
+                Text(),
+                self._figures(pose, now_ns, live),
+            ]
         return Panel(
             Group(*parts),
             title="posed",
             subtitle="Ctrl-C ends",
             border_style=color,
-            width=_WIDTH,
+            width=width,
             padding=(0, 1),
         )
 
@@ -78,21 +86,17 @@ class LiveView:
                 return _DOUBTFUL, f"connected, but no pose for {silent_ns / 1e9:.0f} s"
             if self._connections > 1:
                 return _GOOD, f"connected; the daemon has returned {_times(self._connections - 1)}"
-            return _GOOD, "connected"
-        if state is ServiceState.DISCONNECTED:
-            return _BAD, "the daemon died or hangs; waiting for its return"
-        if state is ServiceState.BINDING_DIED:
-            return _BAD, f"{reason}; waiting for another"
-        return _DOUBTFUL, "no daemon is running; start one with 'posed start'"
+            return _GOOD, state_words(state, reason)
+        gone = state in (ServiceState.DISCONNECTED, ServiceState.BINDING_DIED)
+        return _BAD if gone else _DOUBTFUL, state_words(state, reason)
 
     def _figures(self, pose: Pose, now_ns: int, live: bool) -> Table:
         hz = self.measured_hz()
         age_ms = (now_ns - pose.delivery.to_boot_ns(pose.timestamp_ns)) / 1e6
         table = Table.grid(padding=(0, 1))
-        table.add_column(style="dim", width=10, no_wrap=True)
-        table.add_column(width=26, no_wrap=True)
-        table.add_column(style="dim", width=10, no_wrap=True)
-        table.add_column(width=26, no_wrap=True)
+        for _ in range(2):
+            table.add_column(style="dim", min_width=10, no_wrap=True)
+            table.add_column(width=26, no_wrap=True)
         table.add_row(
             "pose rate",
             f"{hz:.1f} Hz" if live and hz is not None else "-",
@@ -110,15 +114,26 @@ class LiveView:
         return table
 
 
-def _attitude(pose: Pose, live: bool) -> Table:
+def state_words(state: ServiceState, reason: str) -> str:
+    """Return where the daemon stands, for people at a terminal."""
+    if state is ServiceState.CONNECTED:
+        return "connected"
+    if state is ServiceState.DISCONNECTED:
+        return "the daemon died or hangs; waiting for its return"
+    if state is ServiceState.BINDING_DIED:
+        return f"{reason}; waiting for another"
+    return "no daemon has answered yet; 'posed start' starts one"
+
+
+def _attitude(pose: Pose, live: bool, gauge: int) -> Table:
     table = Table.grid(padding=(0, 1))
     table.add_column(style="dim", width=10, no_wrap=True)
     table.add_column(width=13, no_wrap=True)
-    table.add_column(width=_GAUGE, no_wrap=True)
+    table.add_column(width=gauge, no_wrap=True)
     for label, heading in (("camera", pose.camera_heading), ("azimuth", pose.azimuth)):
-        table.add_row(label, f"{bearing_deg(heading):6.1f}° {wind(heading)}", tape(heading))
+        table.add_row(label, f"{bearing_deg(heading):6.1f}° {wind(heading)}", tape(heading, gauge))
     for label, angle, limit in (("pitch", pose.pitch, math.pi / 2), ("roll", pose.roll, math.pi)):
-        table.add_row(label, f"{math.degrees(angle):+6.1f}°", bar(angle / limit))
+        table.add_row(label, f"{math.degrees(angle):+6.1f}°", bar(angle / limit, gauge))
     table.add_row()
     rows = Table.grid(padding=(0, 1))
     rows.add_column(style="dim", width=10, no_wrap=True)
@@ -132,7 +147,7 @@ def _attitude(pose: Pose, live: bool) -> Table:
     return attitude
 
 
-def tape(heading: float, width: int = _GAUGE) -> Text:
+def tape(heading: float, width: int) -> Text:
     """Return the compass as a strip about a heading (rad), 4 degrees a cell; the middle cell is the heading."""
     cells = [" "] * width
     degrees = math.degrees(heading)
@@ -148,7 +163,7 @@ def tape(heading: float, width: int = _GAUGE) -> Text:
     return text
 
 
-def bar(fraction: float, width: int = _GAUGE) -> Text:
+def bar(fraction: float, width: int) -> Text:
     """Return a bar from the middle: to the left for -1 to 0, to the right for 0 to 1."""
     middle = width // 2
     end = middle + round(max(-1.0, min(1.0, fraction)) * middle)

@@ -4,10 +4,11 @@ import argparse
 import json
 from dataclasses import asdict
 
-from posed.cli.connection import require_daemon
-from posed.client import Sensor, SensorManager
 from rich.console import Console
 from rich.table import Table
+
+from posed.cli.connection import require_daemon
+from posed.client import Sensor, SensorManager
 
 _UNITS = {
     Sensor.TYPE_ACCELEROMETER: "m/s²",

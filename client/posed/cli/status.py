@@ -4,11 +4,13 @@ import argparse
 import json
 from typing import Any
 
-from posed.binder.runtime import runtime_directory
-from posed.cli.connection import connect, daemon_listens, sensor_service, service_manager
-from posed.proto import binder_pb2, sensors_pb2, service_manager_pb2
 from rich.console import Console
 from rich.table import Table
+
+from posed.binder.runtime import runtime_directory
+from posed.cli.connection import connect, sensor_service, service_manager
+from posed.client.launcher import daemon_listens
+from posed.proto import binder_pb2, sensors_pb2, service_manager_pb2
 
 # As an init script's `status` has it (LSB): 3 is "program is not running".
 _NOT_RUNNING = 3

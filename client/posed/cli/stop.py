@@ -5,7 +5,8 @@ import contextlib
 import os
 import select
 
-from posed.cli.connection import connect, daemon_listens, service_manager
+from posed.cli.connection import connect, service_manager
+from posed.client.launcher import daemon_listens
 from posed.errors import InvalidStateError, ServiceUnavailableError
 from posed.proto import binder_pb2, service_manager_pb2
 

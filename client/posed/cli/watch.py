@@ -7,14 +7,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 
+from rich.console import Console
+from rich.live import Live
+
 import posed.client as sdk
-from posed.cli.live_view import LiveView
+from posed.cli.live_view import LiveView, state_words
 from posed.cli.options import add_pose_rate_option, add_rate_mode_option, positive_count
 from posed.cli.pose_text import JSON_KEYS, pose_json, pose_line
 from posed.client import Pose, PoseClient, ServiceState
 from posed.client.pose import boot_time_ns
-from rich.console import Console
-from rich.live import Live
 
 # How often the view is drawn though nothing came, so that the age and the state stay true.
 _TICK_S = 0.25
@@ -65,7 +66,7 @@ def draw_poses(client: PoseClient, view: LiveView, *, count: int | None = None, 
     """Draw the view on the terminal until `count` poses or `seconds` have passed."""
 
     def picture() -> None:
-        live.update(view.render(client.state, client.reason, boot_time_ns()), refresh=True)
+        live.update(view.render(client.state, client.reason, boot_time_ns(), live.console.width), refresh=True)
 
     with Live(console=Console(), auto_refresh=False) as live:
         next_frame = 0.0
@@ -96,7 +97,7 @@ def print_poses(
     for pose in _poses(client, count, seconds):
         if client.state is not told:
             told = client.state
-            print(f"posed: {client.reason or told.value}", file=sys.stderr)
+            print(f"posed: {state_words(told, client.reason)}", file=sys.stderr)
         if pose is not None:
             print(text_of(pose), flush=True)
         elif reader.poll(0):

@@ -106,7 +106,8 @@ def _await_ready(ready: socket.socket, alive: int, log_path: Path) -> None:
             if _another_came_first():
                 return
             said = log_path.read_text(errors="replace").strip().splitlines()
-            raise ServiceUnavailableError(f"the daemon did not start: {said[-1] if said else 'it said nothing'}")
+            why = said[-1].removeprefix("posed: error: ") if said else "it said nothing"
+            raise ServiceUnavailableError(f"the daemon did not start: {why}")
     raise ServiceUnavailableError(f"the daemon was not ready after {_READY_TIMEOUT_S:.0f} s; its log is {log_path}")
 
 

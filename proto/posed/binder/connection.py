@@ -138,7 +138,10 @@ class Connection:
     def _read(self) -> None:
         lost = False
         for event, _value in monitor_events(self._monitor):
-            lost = self._lose(self._daemon) if self._daemon is not None else lost
+            if self._daemon is not None:
+                # Its end, whichever event it is: a new handshake follows one that was not seen.
+                self._lose(self._daemon)
+                lost = True
             if event == zmq.EVENT_HANDSHAKE_SUCCEEDED:
                 self._daemon = Peer(b"", _UNKNOWN, _UNKNOWN, self._send_if_connected)
                 self._happened.append(self._tell_connected)
@@ -149,7 +152,7 @@ class Connection:
             self._dealer.connect(self._address)
         self._read_parcels()
 
-    def _lose(self, daemon: Peer) -> bool:
+    def _lose(self, daemon: Peer) -> None:
         # What still arrived comes before the loss. None of it is from a later connection: on that one the daemon, not
         # called yet, has nothing to say.
         while self._read_parcels():
@@ -157,7 +160,6 @@ class Connection:
         self._happened.append(daemon.die)
         self._happened.append(self._tell_disconnected)
         self._daemon = None
-        return True
 
     def _read_parcels(self) -> bool:
         """Take in what has arrived, a bounded number of parcels; True if there is more."""

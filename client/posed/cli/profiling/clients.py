@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Protocol
@@ -58,26 +58,26 @@ class Client(Protocol):
 class Workload:
     """A client of our own: a process that keeps to the rules of posed.cli.profiling.workload."""
 
-    def __init__(self, daemon: Daemon, words: Sequence[str]) -> None:
-        """Start this Python with the words as its command line, as the daemon's client."""
+    def __init__(self, words: Sequence[str], environment: Mapping[str, str]) -> None:
+        """Start this Python with these words as its command line."""
         self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the process)
         self._process = subprocess.Popen(
             [sys.executable, *words],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._stderr,
-            env=daemon.environment(),
+            env=environment,
         )
 
     @classmethod
     def poses(cls, daemon: Daemon, rate_mode: int) -> "Workload":
         """Return a pose client at 10 Hz."""
-        return cls(daemon, ["-m", _WORKLOAD, "pose", str(rate_mode)])
+        return cls(["-m", _WORKLOAD, "pose", str(rate_mode)], daemon.environment())
 
     @classmethod
     def events(cls, daemon: Daemon, rate_mode: int, max_report_latency_us: int) -> "Workload":
         """Return a listener to accelerometer, gyroscope and magnetic field."""
-        return cls(daemon, ["-m", _WORKLOAD, "raw", str(rate_mode), str(max_report_latency_us)])
+        return cls(["-m", _WORKLOAD, "raw", str(rate_mode), str(max_report_latency_us)], daemon.environment())
 
     def __enter__(self) -> "Workload":
         try:
