@@ -1,8 +1,9 @@
-"""Make everything that follows from the .proto files: the *_pb2.py and *_pb2.pyi beside them, and WIRE.md.
+"""Make everything that follows from the .proto files: *_pb2.py, *_pb2.pyi and interface_hashes.py beside them, WIRE.md.
 
 Run it after every edit of a .proto: `python proto/generate.py`.
 """
 
+import hashlib
 import importlib
 import re
 import subprocess
@@ -13,6 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from google.protobuf.descriptor import FileDescriptor
 from google.protobuf.descriptor_pb2 import (
     DescriptorProto,
     EnumDescriptorProto,
@@ -38,6 +40,7 @@ def main() -> None:
     files = compile_protos()
     # Only now: what is imported must be what has just been made.
     sys.path.insert(0, str(ROOT))
+    (PROTOS / "interface_hashes.py").write_text("\n".join(interface_hashes(files)) + "\n", encoding="utf-8")
     (ROOT / "WIRE.md").write_text("\n".join(wire(files)) + "\n", encoding="utf-8")
 
 
@@ -55,6 +58,32 @@ def compile_protos() -> list[FileDescriptorProto]:
         files = FileDescriptorSet.FromString(descriptors.read_bytes()).file
     by_stem = {Path(file.name).stem: file for file in files}
     return [*(by_stem.pop(stem) for stem in _READING_ORDER), *by_stem.values()]
+
+
+def interface_hashes(files: list[FileDescriptorProto]) -> Iterator[str]:
+    """Yield the lines of interface_hashes.py, as aidl_api/<interface>/<version>/.hash keeps them for AIDL."""
+    yield '"""SHA-256 of the serialised descriptors behind each interface. Made by `python proto/generate.py`.'
+    yield ""
+    yield "Kept, not computed at run time: hashlib loads OpenSSL, 3.5 MB of every process that makes a call."
+    yield '"""\n'
+    yield "HASHES = {"
+    for file in files:
+        behind = {each.name: each.serialized_pb for each in _behind(_module(file).DESCRIPTOR)}
+        digest = hashlib.sha256(b"".join(behind[name] for name in sorted(behind))).hexdigest()
+        for service in file.service:
+            yield f'    "{file.package}.{service.name}": "{digest}",'
+    yield "}"
+
+
+def _behind(file: FileDescriptor) -> Iterator[FileDescriptor]:
+    if file.name.startswith("posed/"):
+        yield file
+        for dependency in file.dependencies:
+            yield from _behind(dependency)
+
+
+def _module(file: FileDescriptorProto) -> Any:
+    return importlib.import_module(file.name.removesuffix(".proto").replace("/", ".") + "_pb2")
 
 
 def wire(files: list[FileDescriptorProto]) -> Iterator[str]:
@@ -104,7 +133,7 @@ class _Comments:
 def _services(file: FileDescriptorProto, comments: _Comments) -> Iterator[str]:
     from posed.binder.interface import interface_of
 
-    module: Any = importlib.import_module(file.name.removesuffix(".proto").replace("/", ".") + "_pb2")
+    module = _module(file)
     number = FileDescriptorProto.SERVICE_FIELD_NUMBER
     for index, service in enumerate(file.service):
         interface = interface_of(module.DESCRIPTOR.services_by_name[service.name])
@@ -266,7 +295,7 @@ messages; what finds it full is dropped, and the sequence numbers show it.
 - Heartbeats: both sides send ZMTP pings every 700 ms, time to live 1,200 ms, and drop a connection that does not \
 answer for 1,200 ms. libzmq answers by itself unless its receive queue is full: a client that stops reading is \
 cut off too. Set HEARTBEAT_IVL, HEARTBEAT_TIMEOUT and HEARTBEAT_TTL, a receive high-water mark of 1,000 (never 0) and \
-RECONNECT_IVL 100, RECONNECT_IVL_MAX 2,000. A connection must finish its handshake within 500 ms.
+RECONNECT_IVL 100, RECONNECT_IVL_MAX 500. A connection must finish its handshake within 500 ms.
 - Whatever the daemon knows of a client (services it got, bindings, listeners) ends with its connection. After a \
 reconnect begin again with getService.
 

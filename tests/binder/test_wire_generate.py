@@ -29,14 +29,15 @@ def generate(proto: Path) -> subprocess.CompletedProcess[str]:
 
 
 def generated(proto: Path) -> dict[str, bytes]:
-    files = [*(proto / "posed" / "proto").glob("*_pb2.py*"), proto / "WIRE.md"]
+    made = proto / "posed" / "proto"
+    files = [*made.glob("*_pb2.py*"), made / "interface_hashes.py", proto / "WIRE.md"]
     return {file.name: file.read_bytes() for file in files}
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """The proto directory without what is generated."""
-    ignore = shutil.ignore_patterns("__pycache__", "*_pb2.py*", "WIRE.md")
+    ignore = shutil.ignore_patterns("__pycache__", "*_pb2.py*", "interface_hashes.py", "WIRE.md")
     return Path(shutil.copytree(PROTO, tmp_path / "proto", ignore=ignore))
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import math
 import threading
 from collections.abc import Callable
@@ -114,7 +115,7 @@ def test_pose_rates_have_streams_of_their_own(desk: Any) -> None:
     with PoseClient(every=True) as ten, PoseClient(SENSOR_DELAY_FASTEST, pose_rate_hz=100, every=True) as hundred:
         slow = [ten.next_pose(timeout_s=5) for _ in range(10)]
         fast = [hundred.next_pose(timeout_s=5) for _ in range(50)]
-        assert [b.sequence - a.sequence for a, b in zip(slow, slow[1:], strict=False)] == [1] * 9
+        assert [b.sequence - a.sequence for a, b in itertools.pairwise(slow)] == [1] * 9
         assert sum(pose.missed for pose in fast) <= 5
         hundred.set_pose_rate(20)
         after = [hundred.next_pose(timeout_s=5) for _ in range(60)]

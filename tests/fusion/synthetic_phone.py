@@ -1,10 +1,11 @@
 """A phone of which everything is known: attitude as a function of time, and what perfect sensors would read."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from posed.events import FlatEvents, Float64Array, SensorType
+from posed.events import FlatEvent, Float64Array, Int64Array, SensorType
 from posed.fusion.dcm import DcmFilter
 
 GRAVITY = 9.80665
@@ -14,6 +15,25 @@ GAME = (50.0, 50.0, 50.0)
 NORMAL = (15.0, 5.0, 5.0)
 
 Attitude = Callable[[float], Float64Array]
+
+
+@dataclass(frozen=True)
+class FlatEvents:
+    """Events in one order as arrays, int64[n], int64[n] and float64[n, 3], to be cut and changed."""
+
+    sensor_type: Int64Array
+    timestamp_ns: Int64Array
+    values: Float64Array
+
+    def __len__(self) -> int:
+        return len(self.timestamp_ns)
+
+    def __getitem__(self, rows: slice) -> "FlatEvents":
+        return FlatEvents(self.sensor_type[rows], self.timestamp_ns[rows], self.values[rows])
+
+    def __iter__(self) -> Iterator[FlatEvent]:
+        rows = zip(self.sensor_type.tolist(), self.timestamp_ns.tolist(), self.values.tolist(), strict=True)
+        return ((kind, timestamp_ns, x, y, z) for kind, timestamp_ns, (x, y, z) in rows)
 
 
 def rotation(x: float, y: float, z: float) -> Float64Array:

@@ -7,6 +7,7 @@ from synthetic_phone import (
     FIELD,
     GAME,
     Attitude,
+    FlatEvents,
     between,
     error_deg,
     heading_deg,
@@ -15,7 +16,7 @@ from synthetic_phone import (
     without,
 )
 
-from posed.events import FilterStatus, FlatEvents, Float64Array, Orientation, SensorType
+from posed.events import FilterStatus, Float64Array, Orientation, SensorType
 from posed.fusion.dcm import DcmFilter, DcmParams
 from posed.fusion.gate import GateParams
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from synthetic_phone import FASTEST, GAME, NORMAL, Attitude, error_deg, rotation, sense, without
+from synthetic_phone import FASTEST, GAME, NORMAL, Attitude, FlatEvents, error_deg, rotation, sense, without
 
-from posed.events import FilterStatus, FlatEvents, Float64Array, SensorType
+from posed.events import FilterStatus, Float64Array, SensorType
 from posed.fusion.dcm import DcmFilter, DcmParams
 from posed.fusion.rest import RestParams
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic_phone import FASTEST, GAME, rotation, sense
+from synthetic_phone import FASTEST, GAME, FlatEvents, rotation, sense
 
 from posed.errors import InvalidArgumentError
-from posed.events import FlatEvents, SensorType
+from posed.events import SensorType
 from posed.fusion.dcm import DcmFilter, DcmState
 
 KINDS = np.array([SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD, SensorType.GYROSCOPE], np.int64)

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from synthetic_phone import FlatEvents
 
 from posed.evaluation.measures import nearest_truth, rmse, to_magnetic_north, total_error
-from posed.events import FlatEvents, Float64Array, Int64Array, SensorType
+from posed.events import Float64Array, Int64Array, SensorType
 from posed.fusion.dcm import DcmFilter
 
 DECLINATION = np.radians(1.75)

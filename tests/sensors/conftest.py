@@ -1,6 +1,6 @@
 """A source whose every sample is known, and a filter that counts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from posed.events import (
     EventBatch,
     EventColumn,
     FilterStatus,
-    FlatEvents,
+    FlatEvent,
     Orientation,
     SensorInfo,
     SensorType,
@@ -100,8 +100,8 @@ class CountingFilter:
     def update(self, sensor_type: SensorType, timestamp_ns: int, x: float, y: float, z: float) -> None:
         self.fed.append(timestamp_ns)
 
-    def update_batch(self, events: FlatEvents) -> None:
-        self.fed += events.timestamp_ns.tolist()
+    def update_batch(self, events: Iterable[FlatEvent]) -> None:
+        self.fed += [event[1] for event in events]
 
     def orientation(self) -> Orientation | None:
         if not self.fed:

@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import Any
 
 from posed.errors import AlreadyRunningError, PosedError, ServiceUnavailableError
+from posed.version import __version__
 
 COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("posed.cli.demo", "show the pose of a simulated phone, with a daemon of its own"),
@@ -85,10 +86,7 @@ def _parser() -> argparse.ArgumentParser:
 
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        # Imported only here: it takes as long as all the rest of `posed --help`.
-        from importlib.metadata import version
-
-        print(f"posed {version('posed')}")
+        print(f"posed {__version__}")
         parser.exit()
 
 

@@ -110,8 +110,10 @@ class LiveView:
         table.add_row(
             "heading", f"±{math.degrees(pose.heading_accuracy):.1f}° (1 sigma)", "sequence", str(pose.sequence)
         )
-        table.add_row("status", _status(pose.status), "position", _position(pose.position))
-        return table
+        figures = Table.grid()
+        figures.add_row(table)
+        figures.add_row(_wide(("status", _status(pose.status)), ("position", _position(pose.position))))
+        return figures
 
 
 def state_words(state: ServiceState, reason: str) -> str:
@@ -135,16 +137,22 @@ def _attitude(pose: Pose, live: bool, gauge: int) -> Table:
     for label, angle, limit in (("pitch", pose.pitch, math.pi / 2), ("roll", pose.roll, math.pi)):
         table.add_row(label, f"{math.degrees(angle):+6.1f}°", bar(angle / limit, gauge))
     table.add_row()
-    rows = Table.grid(padding=(0, 1))
-    rows.add_column(style="dim", width=10, no_wrap=True)
-    rows.add_column(no_wrap=True)
-    rows.add_row("quaternion", "  ".join(f"{axis} {q:+.4f}" for axis, q in zip("xyzw", pose.quaternion, strict=True)))
-    rates = (f"{axis} {math.degrees(w):+7.1f}" for axis, w in zip("xyz", pose.angular_rate, strict=True))
-    rows.add_row("turn rate", "  ".join(rates) + "  °/s")
+    quaternion = "  ".join(f"{axis} {q:+.4f}" for axis, q in zip("xyzw", pose.quaternion, strict=True))
+    rates = "  ".join(f"{axis} {math.degrees(w):+7.1f}" for axis, w in zip("xyz", pose.angular_rate, strict=True))
     attitude = Table.grid()
     attitude.add_row(table, style="" if live else "dim")
-    attitude.add_row(rows, style="" if live else "dim")
+    attitude.add_row(_wide(("quaternion", quaternion), ("turn rate", f"{rates}  °/s")), style="" if live else "dim")
     return attitude
+
+
+def _wide(*rows: tuple[str, str | Text]) -> Table:
+    """Return labels with what is too long to stand two in a row."""
+    table = Table.grid(padding=(0, 1))
+    table.add_column(style="dim", min_width=10, no_wrap=True)
+    table.add_column(no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def tape(heading: float, width: int) -> Text:
@@ -164,12 +172,13 @@ def tape(heading: float, width: int) -> Text:
 
 
 def bar(fraction: float, width: int) -> Text:
-    """Return a bar from the middle: to the left for -1 to 0, to the right for 0 to 1."""
+    """Return a bar from the middle to a marker: left of it for -1 to 0, right of it for 0 to 1."""
     middle = width // 2
-    end = middle + round(max(-1.0, min(1.0, fraction)) * middle)
-    text = Text("─" * width, style="bright_black")
-    low, high = min(middle, end), max(middle, end)
-    return Text.assemble(text[:low], ("━" * (high - low), "cyan"), ("┃", "bold cyan"), text[high + 1 :])
+    length = round(max(-1.0, min(1.0, fraction)) * middle)
+    filled = "━" * abs(length)
+    left, right = "─" * (middle + min(length, 0)), "─" * (width - 1 - middle - max(length, 0))
+    drawn = f"{filled}┃" if length > 0 else f"┃{filled}"
+    return Text.assemble((left, "bright_black"), (drawn, "cyan"), (right, "bright_black"))
 
 
 def _status(status: PoseStatus) -> Text:
@@ -181,7 +190,10 @@ def _status(status: PoseStatus) -> Text:
 def _position(position: Position | None) -> str:
     if position is None:
         return "-"
-    return f"{position.latitude_deg:.5f} {position.longitude_deg:.5f} {position.ellipsoidal_height_m:.0f} m"
+    return (
+        f"{position.latitude_deg:.6f}° {position.longitude_deg:.6f}°  {position.ellipsoidal_height_m:.1f} m"
+        f"  ({position.source})"
+    )
 
 
 def _duration(ms: float) -> str:

@@ -1,17 +1,17 @@
 """What an interface offers, read from its protobuf service, and which versions of it understand each other."""
 
-import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from google.protobuf.descriptor import FileDescriptor, MethodDescriptor, ServiceDescriptor
+from google.protobuf.descriptor import MethodDescriptor, ServiceDescriptor
 from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
 
 from posed.binder.status import ExceptionCode, RemoteError
 from posed.proto import binder_pb2
+from posed.proto.interface_hashes import HASHES
 
 FIRST_CALL = 1
 """Code of the first method of every interface (IBinder.FIRST_CALL_TRANSACTION)."""
@@ -65,11 +65,10 @@ def interface_of(descriptor: ServiceDescriptor) -> Interface:
         )
         for index, method in enumerate(descriptor.methods)
     ]
-    files = {file.name: file.serialized_pb for file in _files(descriptor.file)}
     return Interface(
         name=descriptor.full_name,
         version=_option(descriptor, binder_pb2.interface_version),
-        hash=hashlib.sha256(b"".join(files[name] for name in sorted(files))).hexdigest(),
+        hash=HASHES[descriptor.full_name],
         methods_by_name={method.name: method for method in methods},
         methods_by_code={method.code: method for method in methods},
     )
@@ -103,10 +102,3 @@ def check_version(ours: Interface, theirs: binder_pb2.InterfaceInfo) -> None:
 def _option(descriptor: MethodDescriptor | ServiceDescriptor, extension: Any) -> Any:
     # The generated .pyi names extensions plain FieldDescriptors, which the typed Extensions do not take.
     return descriptor.GetOptions().Extensions[extension]
-
-
-def _files(file: FileDescriptor) -> Iterator[FileDescriptor]:
-    if file.name.startswith("posed/"):
-        yield file
-        for dependency in file.dependencies:
-            yield from _files(dependency)

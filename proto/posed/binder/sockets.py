@@ -100,7 +100,8 @@ def _bound(context: Context, kind: int, high_water_mark: int) -> Socket:
 def _connected(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket = _socket(context, kind, high_water_mark)
     socket.setsockopt(zmq.RECONNECT_IVL, 100)
-    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 2000)
+    # A try costs microseconds on a Unix socket; half a second is what a returned daemon is missed for at most.
+    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
     return socket
 
 

@@ -5,14 +5,12 @@ import logging
 import os
 import signal
 import socket
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-
-import zmq
 
 from posed.binder.runtime import InstanceLock, control_path, pose_path, runtime_directory
 from posed.binder.server import Server
-from posed.binder.sockets import context
+from posed.binder.sockets import Socket, context
 from posed.binder.stub import Stub
 from posed.clock import BootClock, Clock
 from posed.daemon.config import DaemonConfig
@@ -24,6 +22,7 @@ from posed.daemon.pose_stub import PoseServiceStub
 from posed.daemon.publisher import PosePublisher
 from posed.daemon.sensor_stub import SensorServiceStub
 from posed.daemon.statistics import PublicationStatistics
+from posed.daemon.waiting import Waiter
 from posed.fusion import make_filter
 from posed.fusion.filter import SensorNoise
 from posed.hal import open_source
@@ -85,38 +84,33 @@ class _Daemon:
         self._manager = ServiceManagerStub(services, self._server.peers, self._lifecycle, clock, self._boot_id, config)
         for name, stub in {"servicemanager": self._manager, **services}.items():
             self._server.add_service(name, stub)
+        self._waiter = Waiter((*self._server.sockets, self._publisher.socket))
 
     def serve(self) -> None:
         """Run until the life cycle or a signal ends it."""
-        poller = zmq.Poller()
-        for input_socket in (*self._server.sockets, self._publisher.socket):
-            poller.register(input_socket, zmq.POLLIN)
-        wait_for_bind_ns = self._clock.now_ns() + _FIRST_BIND_WAIT_NS
         with _signals(self._on_signal) as signal_fd:
-            poller.register(signal_fd, zmq.POLLIN)
+            self._waiter.watch(signal_fd)
+            wait_for_bind_ns = self._clock.now_ns() + _FIRST_BIND_WAIT_NS
             sd_notify("READY=1")
-            _log.info("ready: %s", self._describe())
-            ready = dict(poller.poll(0))
-            more = True
+            _log.info("ready: %s", ", ".join(sensor.name for sensor in self._source.sensors))
+            readable = self._waiter.readable()
             while self._signal is None and not self._lifecycle.over:
-                # Trying a socket that has nothing costs an exception each: 4 % of the daemon's whole CPU time.
-                if more or any(input_socket in ready for input_socket in self._server.sockets):
-                    more = self._server.process()
-                if self._publisher.socket in ready:
-                    self._publisher.read_subscriptions()
+                calls_wait = self._take_in(readable)
                 self._service.advance()
                 self._publisher.publish(self._service.take_poses())
                 self._sensors.deliver(self._header)
-                now_ns = self._clock.now_ns()
-                deadlines = [self._service.next_deadline_ns()]
+                deadline_ns = self._service.next_deadline_ns()
                 if self._lifecycle.awaits_first_bind:
-                    if now_ns >= wait_for_bind_ns:
+                    if self._clock.now_ns() >= wait_for_bind_ns:
                         break
-                    deadlines.append(wait_for_bind_ns)
+                    deadline_ns = min(deadline_ns or wait_for_bind_ns, wait_for_bind_ns)
                 if self._server.retry_s is not None:
-                    deadlines.append(now_ns + int(self._server.retry_s * 1e9))
-                ready = dict(poller.poll(0 if more or self._lifecycle.over else _timeout_ms(deadlines, now_ns)))
-                more = more or self._server.retry_s is not None
+                    retry_ns = self._clock.now_ns() + int(self._server.retry_s * 1e9)
+                    deadline_ns = min(deadline_ns or retry_ns, retry_ns)
+                readable = self._waiter.readable()
+                idle = not (calls_wait or readable or self._lifecycle.over)
+                if idle and self._waiter.wait(deadline_ns):
+                    readable = self._waiter.readable()
         reason = "it was told to stop" if self._signal is None else f"it got {signal.Signals(self._signal).name}"
         _log.info("stopping: %s", reason)
         sd_notify("STOPPING=1")
@@ -124,18 +118,24 @@ class _Daemon:
 
     def close(self) -> None:
         """Close the sockets; what was queued gets a moment to leave."""
+        self._waiter.close()
         self._publisher.close()
         self._server.close()
         self._context.term()
+
+    def _take_in(self, readable: list[Socket]) -> bool:
+        """Handle what the sockets have, and only those: trying one in vain costs an exception. True if calls wait."""
+        if self._publisher.socket in readable:
+            self._publisher.read_subscriptions()
+        if self._server.retry_s is not None or any(each in readable for each in self._server.sockets):
+            return self._server.process()
+        return False
 
     def _on_signal(self, number: int) -> None:
         self._signal = number
 
     def _header(self, sequence: int) -> events_pb2.DeliveryHeader:
         return delivery_header(self._boot_id, sequence, self._clock.now_ns(), self._source.time_map)
-
-    def _describe(self) -> str:
-        return ", ".join(sensor.name for sensor in self._source.sensors)
 
 
 @contextlib.contextmanager
@@ -157,9 +157,3 @@ def _signals(on_signal: Callable[[int], None]) -> Iterator[int]:
             signal.signal(number, handler)
         reader.close()
         writer.close()
-
-
-def _timeout_ms(deadlines_ns: Iterable[int | None], now_ns: int) -> int | None:
-    """Return the time to the earliest deadline, rounded up: a poll of 0.4 ms cut to 0 would spin."""
-    due = [deadline for deadline in deadlines_ns if deadline is not None]
-    return max(0, -(-(min(due) - now_ns) // 1_000_000)) if due else None

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from importlib.metadata import version
 
 from posed.binder.interface import check_version
 from posed.binder.peer import Peer
@@ -13,6 +12,7 @@ from posed.daemon.config import DaemonConfig
 from posed.daemon.lifecycle import Lifecycle
 from posed.errors import InvalidArgumentError
 from posed.proto import binder_pb2, service_manager_pb2
+from posed.version import __version__
 
 
 class ServiceManagerStub(Stub):
@@ -88,7 +88,7 @@ class ServiceManagerStub(Stub):
             source=self._config.source,
             profile=self._config.profile,
             filter=self._config.filter,
-            version=version("posed"),
+            version=__version__,
         )
 
     def _unbind(self, peer: Peer) -> None:

@@ -14,12 +14,12 @@ Where the paper is silent or its letter costs accuracy:
   away the corrected row 3.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import atan2, pi, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
-from posed.events import FilterStatus, FlatEvents, Orientation, SensorType
+from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
 from posed.fusion.dcm_state import DcmParams, DcmState
 from posed.fusion.gate import MagneticGate
 from posed.fusion.rest import RestBias
@@ -76,12 +76,10 @@ class DcmFilter:
         """
         self._take(int(sensor_type), int(timestamp_ns), float(x), float(y), float(z))
 
-    def update_batch(self, events: FlatEvents) -> None:
+    def update_batch(self, events: Iterable[FlatEvent]) -> None:
         """Take events in the order given, each as by `update`."""
         take = self._take
-        types = events.sensor_type.tolist()
-        times = events.timestamp_ns.tolist()
-        for sensor_type, timestamp_ns, (x, y, z) in zip(types, times, events.values.tolist(), strict=True):
+        for sensor_type, timestamp_ns, x, y, z in events:
             take(sensor_type, timestamp_ns, x, y, z)
 
     def orientation(self) -> Orientation | None:

@@ -1,12 +1,12 @@
 """What every orientation filter can do, and what it is told about the sensors."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 from posed.errors import InvalidArgumentError
-from posed.events import FlatEvents, Orientation, SensorType
+from posed.events import FlatEvent, Orientation, SensorType
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class OrientationFilter(Protocol):
     def update(self, sensor_type: SensorType, timestamp_ns: int, x: float, y: float, z: float) -> None:
         """Take one event; other sensor types are ignored."""
 
-    def update_batch(self, events: FlatEvents) -> None:
+    def update_batch(self, events: Iterable[FlatEvent]) -> None:
         """Take events in the order given."""
 
     def orientation(self) -> Orientation | None:

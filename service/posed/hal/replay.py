@@ -212,11 +212,7 @@ class ReplaySource:
             stream.rows(max(after_ns, shift_ns + self._recording.start_ns - 1), until_ns, shift_ns)
             for shift_ns in range(first_ns, last_ns + 1, self._pass_ns)
         ]
-        return EventColumn(
-            np.concatenate([rows.timestamp_ns for rows in passes]),
-            np.concatenate([rows.values for rows in passes]),
-            np.concatenate([rows.accuracy for rows in passes]),
-        )
+        return EventColumn.concatenate(passes)
 
 
 class _Stream:

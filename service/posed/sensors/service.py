@@ -1,8 +1,10 @@
 """The sensor service: registrations in, events and poses out, one drain of the source at a time."""
 
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from operator import itemgetter
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError
@@ -10,7 +12,7 @@ from posed.events import (
     EventBatch,
     EventColumn,
     FilterStatus,
-    FlatEvents,
+    FlatEvent,
     Pose,
     Position,
     RateMode,
@@ -85,10 +87,12 @@ class SensorService:
         virtual = virtual_sensors(physical)
         self.sensors: tuple[SensorInfo, ...] = (*physical, *virtual)
         self._table = {s.handle: ActiveSensor(s, s in virtual) for s in self.sensors}
+        self._active: list[ActiveSensor] = []
         self._inputs = {s.handle: s.type for s in physical if s.type in FUSION_INPUTS}
         self._waiting_flush: dict[int, deque[SensorEventConnection]] = {}
         self._pose_requests: dict[Hashable, _PoseRequest] = {}
         self._grids: dict[int, PoseGrid | None] = {}
+        self._rate_mode = RateMode.CUSTOM
         self._anchor_ns: int | None = None
         self._now_ns = 0
         self._poses: list[Pose] = []
@@ -210,7 +214,7 @@ class SensorService:
     @property
     def active_sensors(self) -> tuple[ActiveSensor, ...]:
         """The sensors that somebody has registered."""
-        return tuple(sensor for sensor in self._table.values() if sensor.requests)
+        return tuple(self._active)
 
     # Moving on
 
@@ -223,7 +227,7 @@ class SensorService:
                 due += [grid.next_ns] if end_ns is None or grid.next_ns <= end_ns else []
             else:
                 due += [t for t in map(self._source.next_sample_ns, self._inputs) if t is not None]
-        for sensor in self._table.values():
+        for sensor in self._active:
             latency_ns = sensor.latency_ns
             if latency_ns is None:
                 continue
@@ -237,7 +241,7 @@ class SensorService:
 
     def advance(self) -> None:
         """Bring everything up to the clock: drain the source, fuse, fill the connections and the poses."""
-        if not any(sensor.requests for sensor in self._table.values()):
+        if not self._active:
             return
         self._now_ns = self._sample_now_ns()
         started = self._clock.cpu_ns()
@@ -297,6 +301,7 @@ class SensorService:
         before, sensor.params = sensor.params, arbitrate(sensor.requests.values())
         if sensor.params == before:
             return
+        self._active = [each for each in self._table.values() if each.requests]
         handle = sensor.info.handle
         if not sensor.is_virtual:
             if sensor.params is None:
@@ -314,6 +319,8 @@ class SensorService:
 
     def _apply_pose_requests(self) -> None:
         sampling_us = self.pose_sampling_period_us
+        if sampling_us is not None:
+            self._rate_mode = RateMode.of_period(sampling_us)
         for handle in self._inputs:
             sensor = self._table[handle]
             if sampling_us is None:
@@ -330,29 +337,29 @@ class SensorService:
 
     def _fuse(self, batch: EventBatch) -> dict[int, EventColumn]:
         """Feed the filter, stopping at every grid instant for a pose and at accelerometer events for fused events."""
-        wants_virtual = any(s.is_virtual and s.listeners for s in self._table.values())
+        wants_virtual = any(sensor.is_virtual for sensor in self._active)
         if not self._grids and not wants_virtual:
             return {}
         flat = batch.flat(self._inputs)
         if len(flat) and self._anchor_ns is None:
-            self._anchor_ns = int(flat.timestamp_ns[0])
+            self._anchor_ns = flat[0][1]
             self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
         started = self._clock.cpu_ns()
         done = 0
         virtual = VirtualEvents()
         for instant_ns, row, grid in self._stops(flat, wants_virtual):
-            stop = int(flat.timestamp_ns.searchsorted(instant_ns, side="right"))
+            stop = bisect_right(flat, instant_ns, done, key=_time_of)
             self._feed(flat[done:stop])
-            done = max(done, stop)
+            done = stop
             if grid is not None:
                 self._pass_instant(grid)
             elif (orientation := self._filter.orientation()) is not None:
-                virtual.add(instant_ns, flat.values[row], orientation)
+                virtual.add(instant_ns, flat[row][2:], orientation)
         self._feed(flat[done:])
         self.filter_cpu_ns += self._clock.cpu_ns() - started
         return virtual.columns()
 
-    def _stops(self, flat: FlatEvents, wants_virtual: bool) -> list[tuple[int, int, PoseGrid | None]]:
+    def _stops(self, flat: list[FlatEvent], wants_virtual: bool) -> list[tuple[int, int, PoseGrid | None]]:
         """Return (instant, row, grid) in time order: poses due (with a grid) and accelerometer events (without)."""
         # A recording that has ended moves no grid on: its last sample is the last thing known.
         end_ns = self._now_ns if self._source.end_ns is None else min(self._now_ns, self._source.end_ns)
@@ -362,13 +369,12 @@ class SensorService:
                 step_ns = grid.period_us * 1000
                 stops += [(instant_ns, -1, grid) for instant_ns in range(grid.next_ns, end_ns + 1, step_ns)]
         if wants_virtual:
-            rows = (flat.sensor_type == SensorType.ACCELEROMETER).nonzero()[0].tolist()
-            stops += [(int(flat.timestamp_ns[row]), row, None) for row in rows]
-        stops.sort(key=lambda stop: stop[0])
+            stops += [(event[1], row, None) for row, event in enumerate(flat) if event[0] == SensorType.ACCELEROMETER]
+        stops.sort(key=_instant_of)
         return stops
 
-    def _feed(self, events: FlatEvents) -> None:
-        if len(events):
+    def _feed(self, events: list[FlatEvent]) -> None:
+        if events:
             self._filter.update_batch(events)
             self.events_fused += len(events)
 
@@ -380,7 +386,8 @@ class SensorService:
             for each in self._grids.values():
                 if each is not None:
                     each.occurred |= occurred
-            orientation = orientation.with_status(orientation.status | grid.occurred)
+            if grid.occurred != occurred:
+                orientation = replace(orientation, status=orientation.status | grid.occurred)
             self._poses.append(
                 Pose(
                     sequence=grid.next_index,
@@ -388,7 +395,7 @@ class SensorService:
                     period_us=grid.period_us,
                     orientation=orientation,
                     filter_name=self._filter.name,
-                    rate_mode=RateMode.of_period(self.pose_sampling_period_us or 0),
+                    rate_mode=self._rate_mode,
                     events_fused=self.events_fused - grid.events_before,
                     position=self._position,
                 )
@@ -399,10 +406,12 @@ class SensorService:
 
     def _release_due(self) -> None:
         """Let go what streams; once one batched sensor is due or full, let all batched ones go, as one FIFO does."""
-        batched = [s for s in self._table.values() if s.latency_ns]
-        for sensor in self._table.values():
+        batched = []
+        for sensor in self._active:
             if sensor.latency_ns == 0:
                 self._release(sensor)
+            elif sensor.latency_ns:
+                batched.append(sensor)
         if self._ended or any(
             s.release_ns <= self._now_ns or s.pending_events >= s.info.fifo_max_event_count for s in batched
         ):
@@ -419,5 +428,7 @@ class SensorService:
             sensor.pending_events = 0
 
 
+_instant_of = itemgetter(0)
+_time_of = itemgetter(1)
 _POSE = "pose"
 _NOBODY = SensorEventConnection(0)

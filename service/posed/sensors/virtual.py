@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from posed.events import EventColumn, Float64Array, Orientation, SensorInfo, SensorType
+from posed.events import EventColumn, Orientation, SensorInfo, SensorType
 
 STANDARD_GRAVITY = 9.80665
 
@@ -71,8 +71,8 @@ class VirtualEvents:
         self._gravity: list[tuple[float, ...]] = []
         self._linear: list[tuple[float, ...]] = []
 
-    def add(self, timestamp_ns: int, acceleration: Float64Array, orientation: Orientation) -> None:
-        """Compute the fused events of one accelerometer event (acceleration float64[3], m/s2, device frame)."""
+    def add(self, timestamp_ns: int, acceleration: tuple[float, float, float], orientation: Orientation) -> None:
+        """Compute the fused events of one accelerometer event (m/s2, device frame)."""
         x, y, z, w = orientation.quaternion
         # Third row of the rotation matrix: up in device axes.
         gravity = (
@@ -80,7 +80,7 @@ class VirtualEvents:
             STANDARD_GRAVITY * 2 * (y * z + w * x),
             STANDARD_GRAVITY * (1 - 2 * (x * x + y * y)),
         )
-        ax, ay, az = acceleration.tolist()
+        ax, ay, az = acceleration
         self._timestamps.append(timestamp_ns)
         self._rotation.append((x, y, z, w, orientation.heading_accuracy))
         self._gravity.append(gravity)

@@ -1,0 +1,84 @@
+"""posed fuse: a recording into CSV."""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import pytest
+from cli_shell import Shell
+
+from posed.cli import fuse, main
+
+
+def _rows(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_poses_of_a_recording(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fuse", str(recording)]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert said.out.startswith(f"{fuse.HEADER}\n")
+    rows = _rows(said.out)
+    numbers = [int(row["sequence"]) for row in rows]
+    assert numbers == list(range(numbers[0], 60))
+    for row in rows:
+        assert math.hypot(*(float(row[axis]) for axis in ("qx", "qy", "qz", "qw"))) == pytest.approx(1)
+        assert float(row["qw"]) >= 0
+        assert (row["rate_mode"], row["filter"]) == ("GAME", "dcm")
+        assert int(row["timestamp_ns"]) <= 7_000_000_000 + int(row["sequence"]) * 100_000_000
+    # Turned by 0.5 rad/s for a second, and back.
+    headings = [2 * math.atan2(float(row["qz"]), float(row["qw"])) for row in rows]
+    assert max(headings) - min(headings) == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_same_recording_gives_the_same_bytes(shell: Shell, recording: Path, tmp_path: Path) -> None:
+    to_stdout = shell.run("fuse", str(recording), "--mode=FASTEST", "--rate=40")
+    to_file = shell.run("fuse", str(recording), "--mode=FASTEST", "--rate=40", "-o", str(tmp_path / "poses.csv"))
+    assert (to_stdout.returncode, to_file.returncode) == (0, 0)
+    assert (tmp_path / "poses.csv").read_text() == to_stdout.stdout
+    assert to_file.stderr == f"{len(_rows(to_stdout.stdout))} poses written to {tmp_path / 'poses.csv'}\n"
+    assert list(shell.directory.iterdir()) == []
+
+
+def test_every_float_is_the_one_computed(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["fuse", str(recording), "--mode", "normal"])
+    for row in _rows(capsys.readouterr().out):
+        for name in ("qx", "qy", "qz", "qw", "wx", "wy", "wz", "heading_accuracy_rad"):
+            assert repr(float(row[name])) == row[name]
+
+
+def test_rows_out_of_order_are_told(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with recording.open("a") as file:
+        file.write("gyroscope,7000000000,0,0,0\n")
+    assert main(["fuse", str(recording)]) == 0
+    assert capsys.readouterr().err == "posed: note: 1 gyroscope rows out of time order are left out\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["missing.csv"], "missing.csv cannot be read"),
+        (["RECORDING", "--filter=best"], "no filter is named 'best'"),
+        (["RECORDING", "--profile=pixel"], "profile 'pixel' is not shipped"),
+        (["RECORDING", "-o", "/nowhere/poses.csv"], "cannot write /nowhere/poses.csv"),
+    ],
+)
+def test_what_cannot_be_fused_is_said(
+    arguments: list[str], words: str, recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fuse", *(str(recording) if word == "RECORDING" else word for word in arguments)]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"posed: error: {words}")
+    assert said.count("\n") == 1
+
+
+def test_a_recording_without_a_magnetometer_has_no_pose(
+    recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    kept = [line for line in recording.read_text().splitlines() if not line.startswith("magnetic_field")]
+    path = tmp_path / "two.csv"
+    path.write_text("\n".join(kept))
+    assert main(["fuse", str(path)]) == 1
+    assert "it has no android.sensor.magnetic_field" in capsys.readouterr().err

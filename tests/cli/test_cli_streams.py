@@ -1,0 +1,171 @@
+"""posed watch, sensors, events and demo, as real commands."""
+
+import json
+import math
+import os
+import pty
+import signal
+import subprocess
+import sys
+
+import pytest
+from cli_shell import Shell
+
+from posed.cli.pose_text import JSON_KEYS
+
+
+def test_poses_as_json(shell: Shell) -> None:
+    shell.run("start", "--position=40.6,22.9,60")
+    watched = shell.run("watch", "--json", "--count=4", "--mode=ui", "--rate=20")
+    assert watched.returncode == 0
+    poses = [json.loads(line) for line in watched.stdout.splitlines()]
+    assert len(poses) == 4
+    for pose in poses:
+        assert [key for key in pose if key not in JSON_KEYS] == []
+        assert math.hypot(*pose["quaternion"]) == pytest.approx(1)
+        assert pose["rate_mode"] == "UI"
+        assert pose["position"]["latitude_deg"] == 40.6
+        assert pose["status"] == []
+    numbers = [pose["sequence"] for pose in poses]
+    assert numbers == sorted(set(numbers))
+
+
+def test_poses_as_lines_off_a_terminal(shell: Shell) -> None:
+    shell.run("start")
+    watched = shell.run("watch", "--count=2")
+    assert watched.returncode == 0
+    assert [line.split()[1] for line in watched.stdout.splitlines()] == ["azimuth"] * 2
+
+
+def test_watch_waits_for_a_daemon_and_outlives_it(shell: Shell) -> None:
+    watch = shell.begin("watch", "--json")
+    assert watch.stdout is not None
+    assert watch.stderr is not None
+    assert watch.stderr.readline() == "posed: no daemon has answered yet; 'posed start' starts one\n"
+    shell.run("start")
+    assert watch.stderr.readline() == "posed: connected\n"
+    first = json.loads(watch.stdout.readline())
+    shell.run("stop")
+    while "the daemon" not in (said := watch.stderr.readline()):
+        assert said
+    shell.run("start")
+    while json.loads(watch.stdout.readline())["boot_id"] == first["boot_id"]:
+        pass
+    code, said = shell.end(watch, signal.SIGINT)
+    assert (code, "Traceback" in said) == (0, False)
+
+
+@pytest.mark.parametrize("command", [["watch"], ["watch", "--json"], ["events", "gyroscope", "--rate=GAME"]])
+def test_a_stream_ends_with_its_reader(shell: Shell, command: list[str]) -> None:
+    shell.run("start")
+    stream = shell.begin(*command)
+    assert stream.stdout is not None
+    assert stream.stdout.readline()
+    stream.stdout.close()
+    assert shell.end(stream) == (0, "")
+
+
+def test_a_stream_ends_with_its_reader_even_while_nothing_comes(shell: Shell) -> None:
+    watch = shell.begin("watch", "--json")
+    assert watch.stdout is not None
+    assert watch.stderr is not None
+    assert watch.stderr.readline()
+    watch.stdout.close()
+    assert shell.end(watch) == (0, "")
+
+
+@pytest.mark.parametrize("command", [["watch"], ["events", "accelerometer"]])
+def test_ctrl_c_ends_a_stream_in_good_order(shell: Shell, command: list[str]) -> None:
+    shell.run("start")
+    stream = shell.begin(*command)
+    assert stream.stdout is not None
+    assert stream.stdout.readline()
+    assert shell.end(stream, signal.SIGINT) == (0, "")
+
+
+def test_sensors(shell: Shell) -> None:
+    shell.run("start")
+    sensors = {sensor["string_type"]: sensor for sensor in json.loads(shell.run("sensors", "--json").stdout)}
+    gyroscope = sensors["android.sensor.gyroscope"]
+    assert (gyroscope["name"], gyroscope["min_delay"], gyroscope["max_delay"]) == ("BMI055 Gyroscope", 5000, 200_000)
+    assert "android.sensor.rotation_vector" in sensors
+    explained = shell.run("sensors", "--help").stdout
+    assert [key for key in gyroscope if key not in explained] == []
+
+    table = shell.run("sensors").stdout
+    assert max(map(len, table.splitlines())) <= 80
+    for string_type in sensors:
+        assert string_type.removeprefix("android.sensor.") in table
+
+
+@pytest.mark.parametrize("name", ["gyroscope", "GYROSCOPE", "android.sensor.gyroscope", "4"])
+def test_events_of_a_sensor_by_each_of_its_names(shell: Shell, name: str) -> None:
+    shell.run("start")
+    listened = shell.run("events", name, "--rate=50", "--count=3", "--json")
+    events = [json.loads(line) for line in listened.stdout.splitlines()]
+    assert [event["sensor"] for event in events] == ["gyroscope"] * 3
+    assert [event["handle"] for event in events] == [4] * 3
+    assert all(len(event["values"]) == 3 and event["accuracy"] == 3 for event in events)
+    times = [event["timestamp_ns"] for event in events]
+    assert times == sorted(times)
+    assert times[2] - times[0] == pytest.approx(40e6, abs=8e6)
+
+
+def test_events_for_people(shell: Shell) -> None:
+    shell.run("start", "--source=sim:still")
+    lines = shell.run("events", "gravity", "--rate=UI", "--latency=300", "--count=2").stdout.splitlines()
+    assert len(lines) == 2
+    assert all("m/s²" in line and line.endswith("high") for line in lines)
+
+
+def test_an_unknown_sensor_is_answered_with_the_list(shell: Shell) -> None:
+    shell.run("start")
+    asked = shell.run("events", "thermometer")
+    assert asked.returncode == 1
+    assert asked.stderr.startswith("posed: error: there is no sensor 'thermometer'; there are accelerometer, ")
+    assert asked.stderr.count("\n") == 1
+
+
+def test_a_demo_leaves_nothing_behind_and_the_users_daemon_alone(shell: Shell) -> None:
+    shell.run("start")
+    ran = shell.run("demo", "--seconds=2")
+    assert (ran.returncode, ran.stderr) == (0, "")
+    lines = ran.stdout.splitlines()
+    assert lines
+    assert all(line.split()[1] == "azimuth" for line in lines)
+    assert [path.name for path in shell.directory.iterdir()] == ["posed"]
+    facts = json.loads(shell.run("status", "--json").stdout)
+    assert (facts["pid"], facts["poses_published"]) == (shell.daemon_pid, 0)
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_a_demo_cut_short_leaves_nothing_behind(shell: Shell, number: signal.Signals, code: int) -> None:
+    demo = shell.begin("demo", "--seconds=60")
+    assert demo.stdout is not None
+    assert demo.stdout.readline()
+    assert shell.end(demo, number) == (code, "")
+    assert list(shell.directory.iterdir()) == []
+
+
+def test_a_demo_on_a_terminal_draws(shell: Shell) -> None:
+    terminal, its_end = pty.openpty()
+    demo = subprocess.Popen(
+        [sys.executable, "-m", "posed.cli", "demo", "--seconds=3"],
+        stdin=its_end,
+        stdout=its_end,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "LINES": "24"},
+    )
+    os.close(its_end)
+    seen = b""
+    while True:
+        try:
+            seen += os.read(terminal, 65536)
+        except OSError:  # how a pseudo-terminal tells that nobody writes to it any more
+            break
+    os.close(terminal)
+    _, said = demo.communicate(timeout=20)
+    assert (demo.returncode, said) == (0, b"")
+    drawn = seen.decode()
+    for word in ("posed", "connected", "azimuth", "quaternion", "GAME", "Ctrl-C ends"):
+        assert word in drawn
