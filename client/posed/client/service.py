@@ -16,7 +16,7 @@ from google.protobuf.descriptor import ServiceDescriptor
 from posed.binder.connection import Connection
 from posed.binder.interface import interface_of
 from posed.binder.proxy import Proxy
-from posed.binder.runtime import control_path, runtime_directory
+from posed.binder.runtime import control_path, endpoint, runtime_directory
 from posed.binder.sockets import Context, Socket, context
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
 from posed.binder.stub import Caller, Stub
@@ -90,7 +90,8 @@ class Service:
         self._extra: dict[Socket, Callable[[], None]] = {}
         self.context: Context = context()
         self.directory = runtime_directory()
-        self._wake_fd = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
+        endpoint(control_path(self.directory))  # a path too long is the caller's to hear of, not the thread's
+        self._wake_fd: int | None = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
         self._thread = threading.Thread(target=self._run, name="posed-client", daemon=True)
         self._thread.start()
 
@@ -165,11 +166,9 @@ class Service:
     # Private
 
     def _wake(self) -> None:
-        try:
-            os.eventfd_write(self._wake_fd, 1)
-        except OSError:
-            if self._thread.is_alive():
-                raise
+        with self._changed:
+            if self._wake_fd is not None:
+                os.eventfd_write(self._wake_fd, 1)
 
     def _set_state(self, state: ServiceState, reason: str) -> None:
         with self._changed:
@@ -182,6 +181,8 @@ class Service:
         return self._connection.proxy(_MANAGER, "servicemanager", timeout_s)
 
     def _run(self) -> None:
+        wake_fd = self._wake_fd
+        assert wake_fd is not None
         self._connection = Connection(control_path(self.directory), self.context)
         self._connection.on_connected = lambda: self._links.append(True)
         self._connection.on_disconnected = lambda: self._links.append(False)
@@ -189,19 +190,29 @@ class Service:
         self._poller = zmq.Poller()
         for socket in self._connection.sockets:
             self._poller.register(socket, zmq.POLLIN)
-        self._poller.register(self._wake_fd, zmq.POLLIN)
+        self._poller.register(wake_fd, zmq.POLLIN)
         if self._auto_create:
             self._start_daemon()
         try:
             while self._state is not ServiceState.CLOSED:
                 self._turn()
             self._leave()
+        except PosedError as error:
+            # The socket is somebody else's, or this is a forked child: nothing more can come of this binding.
+            self._die(str(error))
         finally:
             self._binding.release(self)
             self._connection.close()
             self._fail_requests()
             self.context.destroy(linger=0)
-            os.close(self._wake_fd)
+            self._close_waker()
+
+    def _close_waker(self) -> None:
+        # Under the lock: a number written to after it was closed could be another file's.
+        with self._changed:
+            if self._wake_fd is not None:
+                os.close(self._wake_fd)
+            self._wake_fd = None
 
     def _turn(self) -> None:
         """Take in what happened, then wait for more."""
@@ -220,7 +231,7 @@ class Service:
             self._try_again()
         # A call that waited for its reply has read the sockets: what came besides is only seen by the next process.
         ready = dict(self._poller.poll(0 if more else self._timeout_ms()))
-        if self._wake_fd in ready:
+        if self._wake_fd is not None and self._wake_fd in ready:
             os.eventfd_read(self._wake_fd)
         for socket, on_readable in list(self._extra.items()):
             if socket in ready:
@@ -260,8 +271,7 @@ class Service:
             return
         except PosedError as error:
             self._binding.release(self)
-            self._set_state(ServiceState.BINDING_DIED, str(error))
-            self._call_back(self._on_died, str(error))
+            self._die(str(error))
             return
         self._set_state(ServiceState.CONNECTED, "")
         self._call_back(self._on_connected)
@@ -270,8 +280,7 @@ class Service:
         self._binding.release(self)
         was = self._state
         if self._farewell is not None:
-            self._set_state(ServiceState.BINDING_DIED, self._farewell)
-            self._call_back(self._on_died, self._farewell)
+            self._die(self._farewell)
         elif was is not ServiceState.BINDING_DIED:
             self._set_state(ServiceState.DISCONNECTED, "the daemon went away without a word; waiting for its return")
             if was is ServiceState.CONNECTED:
@@ -288,8 +297,11 @@ class Service:
         try:
             ensure_daemon()
         except (PosedError, OSError) as error:
-            self._set_state(ServiceState.BINDING_DIED, str(error))
-            self._call_back(self._on_died, str(error))
+            self._die(str(error))
+
+    def _die(self, reason: str) -> None:
+        self._set_state(ServiceState.BINDING_DIED, reason)
+        self._call_back(self._on_died, reason)
 
     def _leave(self) -> None:
         """Tell a daemon that is there that this client goes; one that is not there knows already."""
