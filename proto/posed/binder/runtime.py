@@ -4,7 +4,6 @@ import contextlib
 import fcntl
 import os
 import stat
-import tempfile
 from pathlib import Path
 
 import zmq
@@ -22,6 +21,8 @@ def runtime_directory(create: bool = True) -> Path:
     if os.path.isabs(base):
         directory = Path(base) / "posed"
     else:
+        import tempfile  # not needed in a login session; it loads the archive formats with it
+
         directory = Path(tempfile.gettempdir()).absolute() / f"posed-{os.getuid()}"
     if create:
         try:

@@ -76,6 +76,10 @@ class _TimerSpec(ctypes.Structure):
 
 
 _libc = ctypes.CDLL(None, use_errno=True)
+_settime = _libc.timerfd_settime
+# Made once: the timer is set at every wake-up.
+_spec = _TimerSpec()
+_spec_pointer = ctypes.byref(_spec)
 
 
 def _timerfd_create() -> int:
@@ -87,7 +91,8 @@ def _timerfd_create() -> int:
 
 def _timerfd_settime(fd: int, deadline_ns: int | None) -> None:
     """Arm the timer; a value of zero disarms it, so a deadline that early is one nanosecond."""
-    seconds, nanoseconds = divmod(0 if deadline_ns is None else max(1, deadline_ns), 1_000_000_000)
-    spec = _TimerSpec(_TimeSpec(0, 0), _TimeSpec(seconds, nanoseconds))
-    if _libc.timerfd_settime(fd, _TFD_TIMER_ABSTIME, ctypes.byref(spec), None) < 0:
+    _spec.it_value.tv_sec, _spec.it_value.tv_nsec = divmod(
+        0 if deadline_ns is None else max(1, deadline_ns), 1_000_000_000
+    )
+    if _settime(fd, _TFD_TIMER_ABSTIME, _spec_pointer, None) < 0:
         raise OSError(ctypes.get_errno(), "timerfd_settime failed")

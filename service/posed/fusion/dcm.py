@@ -29,6 +29,11 @@ __all__ = ["DcmFilter", "DcmParams", "DcmState"]
 _ACCELEROMETER = int(SensorType.ACCELEROMETER)
 _MAGNETIC_FIELD = int(SensorType.MAGNETIC_FIELD)
 _GYROSCOPE = int(SensorType.GYROSCOPE)
+_INITIALISING = int(FilterStatus.INITIALISING)
+_AT_REST = int(FilterStatus.AT_REST)
+_MAGNETIC_DISTURBANCE = int(FilterStatus.MAGNETIC_DISTURBANCE)
+_GYRO_LOST = int(FilterStatus.GYRO_LOST)
+_FREE_FALL = int(FilterStatus.FREE_FALL)
 _GAP = int(FilterStatus.GAP)
 _BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
@@ -87,20 +92,22 @@ class DcmFilter:
         s = self.state
         if not s.started:
             return None
-        status = FilterStatus(s.events)
+        # Plain integers: an IntFlag's operators cost a hundred times theirs.
+        status = s.events
         accuracy = min(sqrt(self._heading_variance()), _UNKNOWN_HEADING)
         if not (s.has_up and s.has_north):
-            status |= FilterStatus.INITIALISING
+            status |= _INITIALISING
             accuracy = _UNKNOWN_HEADING
         if s.rest.at_rest:
-            status |= FilterStatus.AT_REST
+            status |= _AT_REST
         if s.gate.disturbed:
-            status |= FilterStatus.MAGNETIC_DISTURBANCE
+            status |= _MAGNETIC_DISTURBANCE
         if s.gyro_lost:
-            status |= FilterStatus.GYRO_LOST
+            status |= _GYRO_LOST
         if s.free_fall:
-            status |= FilterStatus.FREE_FALL
-        return Orientation(s.time_ns, s.matrix.quaternion(), (s.rate_x, s.rate_y, s.rate_z), accuracy, status)
+            status |= _FREE_FALL
+        rate = (s.rate_x, s.rate_y, s.rate_z)
+        return Orientation(s.time_ns, s.matrix.quaternion(), rate, accuracy, FilterStatus(status))
 
     def clear_events(self) -> None:
         """Forget GAP and BAD_SAMPLE; their counts stay."""

@@ -24,11 +24,14 @@ class DirectionCosines:
         Patonis 2018, Eq. 3, which is its first order. Rows 2 and 3 are turned, row 1 is their product.
         """
         angle2 = x * x + y * y + z * z
-        if angle2 == 0.0:
-            return
-        angle = sqrt(angle2)
-        a = sin(angle) / angle
-        b = (1.0 - cos(angle)) / angle2
+        if angle2 < 1e-3:
+            # Below 0.03 rad the series are exact to the last bit, cheaper, and free of the cancellation in 1 - cos.
+            a = 1.0 - angle2 * (1.0 - angle2 * (1.0 - angle2 / 42.0) / 20.0) / 6.0
+            b = 0.5 - angle2 * (1.0 - angle2 * (1.0 - angle2 / 56.0) / 30.0) / 24.0
+        else:
+            angle = sqrt(angle2)
+            a = sin(angle) / angle
+            b = (1.0 - cos(angle)) / angle2
         bx = b * x
         by = b * y
         xx = bx * x

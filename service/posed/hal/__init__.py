@@ -16,7 +16,7 @@ def open_source(
     seed (0 or more) is the simulation's; speed (times real time) and loop are a replay's. Raises InvalidArgumentError
     for anything else, and RecordingError for a recording that cannot be read.
     """
-    # Each source is imported only where it is wanted: numpy.random alone is 7 MB, and a replay needs none.
+    # Each source is imported only where it is wanted: neither needs what the other loads.
     kind, _, rest = spec.partition(":")
     if kind == "sim":
         from posed.hal.motion import DEFAULT_SCRIPT, make_script

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from posed.errors import InvalidArgumentError
 from posed.events import Float64Array
 from posed.hal import rotation
+from posed.hal.seeded import SeededRandom
 from posed.hal.smooth import Jet, Schedule, Unrest, sine_wave
 from posed.hal.toml_table import close_match
 
@@ -60,7 +61,7 @@ def make_script(name: str, seed: int) -> MotionScript:
     if make is None:
         hint = close_match(name, _SCRIPTS)
         raise InvalidArgumentError(f"motion script {name!r} is unknown; allowed: {', '.join(_SCRIPTS)}{hint}")
-    return make(np.random.default_rng([seed, _MOTION_STREAM]))
+    return make(SeededRandom(seed, _MOTION_STREAM))
 
 
 _MOTION_STREAM = 1
@@ -132,13 +133,13 @@ class _Magnet(_Table):
     _MOMENT = 0.4  # A m2, a small neodymium magnet: about 50 uT where it comes nearest.
     _FAR_M, _NEAR_M = 1.5, 0.1
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: SeededRandom) -> None:
         far, near = self._FAR_M, self._NEAR_M
         self._heading = Schedule([20.0, 28.0], [2.0, 4.0], [0.0, math.pi / 2, 0.0], self._ROUND_S)
         self._distance = Schedule([8, 15, 26, 33], [3.0] * 4, [far, near, far, near, far], self._ROUND_S)
-        side = rng.uniform(0.0, 2.0 * math.pi)
+        side = rng.number(0.0, 2.0 * math.pi)
         self._way = np.array([math.cos(side), math.sin(side), 0.0])
-        axis = rng.normal(size=3)
+        axis = rng.normal((3,))
         self._dipole = self._MOMENT * axis / np.linalg.norm(axis)
 
     def attitude(self, t: Float64Array) -> Float64Array:
@@ -161,7 +162,7 @@ class _Hand(_Table):
 
     targets = _TARGETS
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: SeededRandom) -> None:
         # Sway, its correction, tremor: 2 deg/s and 0.1 m/s2 together.
         self._turning = Unrest((0.23, 0.61, 1.7, 9.3), (8e-3, 4e-3, 2e-3, 4e-4), rng)
         self._shifting = Unrest((0.19, 0.47, 1.4, 8.7), (4e-3, 2e-3, 4e-4, 1.5e-5), rng)
@@ -186,15 +187,15 @@ class _LookAround(_Hand):
 
     _ARM_M = 0.35  # The phone goes round its holder.
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: SeededRandom) -> None:
         super().__init__(rng)
         starts, durations, headings, elevations = [], [], [0.0], [0.0]
         now = 0.0
         for index in self._visits(rng):
-            now += rng.uniform(1.5, 4.0)
+            now += rng.number(1.5, 4.0)
             turn = math.remainder(_TARGETS[index].heading - headings[-1], 2.0 * math.pi)
             starts.append(now)
-            durations.append(max(0.8, abs(turn) / rng.uniform(0.5, 1.1)))
+            durations.append(max(0.8, abs(turn) / rng.number(0.5, 1.1)))
             headings.append(headings[-1] + turn)
             elevations.append(_TARGETS[index].elevation)
             now += durations[-1]
@@ -215,15 +216,15 @@ class _LookAround(_Hand):
         return super().acceleration(t) + self._ARM_M * arm
 
     @staticmethod
-    def _visits(rng: np.random.Generator) -> list[int]:
+    def _visits(rng: SeededRandom) -> list[int]:
         """Return which targets are looked at, north first and last, none twice in a row: about five minutes."""
         visits = [0]
         for _ in range(6):
-            for index in rng.permutation(len(_TARGETS)).tolist():
+            for index in rng.permutation(len(_TARGETS)):
                 if index == visits[-1]:
                     continue
                 visits.append(index)
-                if rng.random() < 0.3:
+                if rng.number(0.0, 1.0) < 0.3:
                     visits.append(visits[-2])
         return [*visits[1:], 0] if visits[-1] else visits[1:]
 
@@ -236,7 +237,7 @@ class _Walk(_Hand):
     _SPEED = 1.3
     _STAND_S, _START_S, _TURN_S, _LEG_S = 3.0, 1.5, 2.0, 8.0
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: SeededRandom) -> None:
         super().__init__(rng)
         # The stop halves the leg to the north, and starting and stopping cover as much as _START_S at full speed: so
         # that the legs to the north and to the south are equally long and the round closes.
@@ -301,7 +302,7 @@ class _Shake(_Hand):
     _EVERY_S, _FROM_S, _LASTS_S = 8.0, 5.0, 1.5
     _KINDS = 16
 
-    def __init__(self, rng: np.random.Generator) -> None:
+    def __init__(self, rng: SeededRandom) -> None:
         super().__init__(rng)
         self._axes = self._directions(rng) * math.radians(14.0)
         self._ways = self._directions(rng) * 0.045
@@ -330,13 +331,13 @@ class _Shake(_Hand):
         bump = Jet(x, speed, np.zeros_like(x)) * Jet(1.0 - x, -speed, np.zeros_like(x))
         return number.astype(np.int64) % self._KINDS, (bump * bump * bump).scaled(64.0)
 
-    def _directions(self, rng: np.random.Generator) -> Float64Array:
-        vectors = rng.normal(size=(self._KINDS, 3))
+    def _directions(self, rng: SeededRandom) -> Float64Array:
+        vectors = rng.normal((self._KINDS, 3))
         directions: Float64Array = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
         return directions
 
 
-_SCRIPTS: dict[str, Callable[[np.random.Generator], MotionScript]] = {
+_SCRIPTS: dict[str, Callable[[SeededRandom], MotionScript]] = {
     DEFAULT_SCRIPT: _LookAround,
     "still": lambda rng: _Table(),
     "turn-x": lambda rng: _Turn(0, 1.0),

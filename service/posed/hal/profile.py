@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -187,7 +186,7 @@ def load_profile(name_or_path: str) -> DeviceProfile:
     return _parse(file, _SHIPPED.joinpath(file).read_bytes())
 
 
-_SHIPPED = resources.files("posed.hal").joinpath("profiles")
+_SHIPPED = Path(__file__).with_name("profiles")
 
 
 def _kinds(part: SensorType) -> tuple[SensorType, SensorType]:

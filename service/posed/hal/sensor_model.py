@@ -11,6 +11,7 @@ from posed.hal import rotation
 from posed.hal.calibration import Calibration
 from posed.hal.motion import MotionScript
 from posed.hal.profile import SensorProfile, exact_period_ns
+from posed.hal.seeded import SeededRandom
 
 STANDARD_GRAVITY = 9.80665
 """m/s2, Android's SensorManager.STANDARD_GRAVITY."""
@@ -54,10 +55,10 @@ class SensorModel:
         self._script = script
         self._field = site.field()
         self._key = [seed, _ERROR_STREAM, int(part.type)]
-        rng = np.random.default_rng(self._key)
+        rng = SeededRandom(*self._key)
         bounds = part.residual
-        self._bias = rng.uniform(-1.0, 1.0, 3) * (bounds.bias + bounds.hard_iron)
-        self._errors = np.eye(3) + np.diag(rng.uniform(-1.0, 1.0, 3) * bounds.scale)
+        self._bias = rng.uniform(-1.0, 1.0, (3,)) * (bounds.bias + bounds.hard_iron)
+        self._errors = np.eye(3) + np.diag(rng.uniform(-1.0, 1.0, (3,)) * bounds.scale)
         self._errors += rng.uniform(-1.0, 1.0, (3, 3)) * (1.0 - np.eye(3)) * bounds.misalignment
         soft_iron = rng.uniform(-1.0, 1.0, (3, 3)) * bounds.soft_iron
         self._errors += 0.5 * (soft_iron + soft_iron.T)
@@ -73,8 +74,8 @@ class SensorModel:
         grid_ns = _grid_ns(period, index)
         t = 1e-9 * grid_ns.astype(np.float64)
         truth = self._truth(t, np.diff(grid_ns))
-        rng = np.random.default_rng([*self._key, period.numerator, period.denominator, index])
-        noise = rng.standard_normal((BLOCK_SAMPLES, 4))
+        rng = SeededRandom(*self._key, period.numerator, period.denominator, index)
+        noise = rng.normal((BLOCK_SAMPLES, 4))
         reading = truth @ self._errors.T + self._bias + self._walk.at(t[1:])
         reading += noise[:, :3] * (self._part.noise_density * rate_hz**0.5)
         # Kept within a third of the period, so that timestamps ascend whatever is drawn.
@@ -129,7 +130,7 @@ class _RandomWalk:
         node = at_node.astype(np.int64)
         while len(self._nodes) < node[-1] + 2:
             chunk = len(self._nodes) // self._CHUNK
-            steps = np.random.default_rng([*self._key, chunk]).standard_normal((self._CHUNK, 3)) * self._step
+            steps = SeededRandom(*self._key, chunk).normal((self._CHUNK, 3)) * self._step
             self._nodes = np.concatenate([self._nodes, self._nodes[-1] + np.cumsum(steps, axis=0)])
         before = self._nodes[node]
         return before + (at_node - node)[:, np.newaxis] * (self._nodes[node + 1] - before)

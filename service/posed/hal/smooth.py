@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posed.events import Float64Array
+from posed.hal.seeded import SeededRandom
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ class Schedule:
 class Unrest:
     """A sum of slow and fast sines on three axes that starts from zero: a hand never holds quite still."""
 
-    def __init__(self, hertz: Sequence[float], amplitudes: Sequence[float], rng: np.random.Generator) -> None:
+    def __init__(self, hertz: Sequence[float], amplitudes: Sequence[float], rng: SeededRandom) -> None:
         """Give each sine (frequency in Hz, amplitude) its own size and phase on each axis."""
         self._rates = 2.0 * math.pi * np.array(hertz)
         sizes = np.array(amplitudes)[:, np.newaxis] * rng.uniform(0.6, 1.4, (len(hertz), 3))

@@ -31,7 +31,7 @@ MAX_POSE_PERIOD_US = 1_000_000
 
 # SensorService.h: what a connection keeps where no sensor has a hardware FIFO.
 _MIN_CONNECTION_CAPACITY = 984
-_OCCURRENCES = FilterStatus.GAP | FilterStatus.BAD_SAMPLE
+_OCCURRENCES = int(FilterStatus.GAP | FilterStatus.BAD_SAMPLE)
 
 
 @dataclass(slots=True)
@@ -381,12 +381,12 @@ class SensorService:
     def _pass_instant(self, grid: PoseGrid) -> None:
         orientation = self._filter.orientation()
         if orientation is not None:
-            occurred = orientation.status & _OCCURRENCES
-            self._filter.clear_events()
-            for each in self._grids.values():
-                if each is not None:
-                    each.occurred |= occurred
-            if grid.occurred != occurred:
+            if int(orientation.status) & _OCCURRENCES:
+                self._filter.clear_events()
+                for each in self._grids.values():
+                    if each is not None:
+                        each.occurred |= orientation.status & _OCCURRENCES
+            if grid.occurred:
                 orientation = replace(orientation, status=orientation.status | grid.occurred)
             self._poses.append(
                 Pose(
