@@ -24,6 +24,7 @@ import csv
 import io
 import math
 import tomllib
+from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,8 +70,9 @@ def load_csv(path: Path) -> Recording:
     names = [name.strip() for name in header]
     sidecar = path.with_suffix(".toml")
     layout = _mapped_layout(path, names, sidecar) if sidecar.exists() else _own_layout(path, names)
-    times: dict[SensorType, list[int]] = {sensor.type: [] for sensor in layout.sensors.values()}
-    values: dict[SensorType, list[list[float]]] = {sensor.type: [] for sensor in layout.sensors.values()}
+    # Arrays, not lists: what a list of numbers leaves behind in Python's heap stays with the daemon.
+    times = {sensor.type: array("q") for sensor in layout.sensors.values()}
+    values = {sensor.type: array("d") for sensor in layout.sensors.values()}
     for number, row in lines:
         if not layout.fewest <= len(row) <= len(names):
             raise RecordingError(f"{path}:{number}: {len(row)} columns; expected {len(names)}: {', '.join(names)}")
@@ -83,12 +85,12 @@ def load_csv(path: Path) -> Recording:
             if time_ns is None:
                 time_ns = _time(at, names[layout.time], row[layout.time], layout.nanoseconds)
             times[sensor.type].append(time_ns)
-            values[sensor.type].append(_values(at, [names[index] for index in sensor.indexes], cells, sensor))
+            values[sensor.type].extend(_values(at, [names[index] for index in sensor.indexes], cells, sensor))
     columns: dict[SensorType, EventColumn] = {}
     dropped: dict[SensorType, int] = {}
     for sensor_type, stamps in times.items():
         if stamps:
-            rows = np.array(values[sensor_type], np.float64)
+            rows = np.array(values[sensor_type], np.float64).reshape(len(stamps), -1)
             columns[sensor_type], dropped[sensor_type] = in_time_order(np.array(stamps, np.int64), rows)
     if not columns:
         raise RecordingError(f"{path} holds a header and no sample; expected rows behind {','.join(names)}")
