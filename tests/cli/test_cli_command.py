@@ -26,7 +26,7 @@ def test_help_imports_no_library_and_no_room() -> None:
     ran = subprocess.run([sys.executable, "-c", _MODULES_AFTER_HELP], capture_output=True, text=True, check=True)
     modules = set(ran.stderr.split())
     assert not modules & {"numpy", "zmq", "rich", "google.protobuf", "asyncio", "importlib.metadata", "subprocess"}
-    assert {name for name in modules if name.startswith("posed.")} == {"posed.cli", "posed.errors"}
+    assert {name for name in modules if name.startswith("posed.")} == {"posed.cli", "posed.errors", "posed.version"}
 
 
 def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
