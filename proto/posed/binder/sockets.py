@@ -112,11 +112,13 @@ def _socket(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket.setsockopt(zmq.RCVHWM, high_water_mark)
     # By default a frame that claims 1 GiB gets 1 GiB. Parcels end at 64 KiB.
     socket.setsockopt(zmq.MAXMSGSIZE, 128 * 1024)
-    # A stopped process answers nothing but keeps its sockets open: seen after 1.2 to 1.9 s, as the ping it leaves
-    # unanswered is up to 0.7 s away. 700 ms cost 25 wake-ups/s in all, 200 ms 32 to 39.
-    socket.setsockopt(zmq.HEARTBEAT_IVL, 700)
+    # A stopped process answers nothing but keeps its sockets open: seen on a control socket after 1.2 to 1.9 s, as the
+    # ping it leaves unanswered is up to 0.7 s away. On a pose socket it only costs what is sent in vain, and pings as
+    # often would wake the daemon three times a second for each client.
+    control = kind in (zmq.ROUTER, zmq.DEALER)
+    socket.setsockopt(zmq.HEARTBEAT_IVL, 700 if control else 3000)
     socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1200)
-    socket.setsockopt(zmq.HEARTBEAT_TTL, 1200)
+    socket.setsockopt(zmq.HEARTBEAT_TTL, 1200 if control else 4200)
     # Who connects and says nothing, or not ZMTP, is gone after this long.
     socket.setsockopt(zmq.HANDSHAKE_IVL, 500)
     return socket

@@ -29,24 +29,39 @@ def delivery_header(boot_id: bytes, sequence: int, published_ns: int, mapping: T
     )
 
 
-def pose(pose: Pose) -> pose_pb2.Pose:
-    """Return a pose as its message."""
-    orientation = pose.orientation
-    x, y, z, w = orientation.quaternion
-    wx, wy, wz = orientation.angular_rate
-    message = pose_pb2.Pose(
-        timestamp_ns=orientation.timestamp_ns,
-        orientation=pose_pb2.Quaternion(x=x, y=y, z=z, w=w),
-        angular_rate=pose_pb2.Vector3(x=wx, y=wy, z=wz),
-        heading_accuracy=orientation.heading_accuracy,
-        filter=pose.filter_name,
-        status=int(orientation.status),
-        rate_mode=cast("pose_pb2.RateMode", pose.rate_mode),
-        events_fused=pose.events_fused,
-    )
-    if pose.position is not None:
-        message.position.CopyFrom(_position(pose.position, orientation.timestamp_ns))
-    return message
+class PoseEncoder:
+    """Poses as bytes, made in one message that is kept: making one with its parts anew takes twice the time."""
+
+    def __init__(self, boot_id: bytes) -> None:
+        self._message = pose_pb2.PoseMessage()
+        self._header = self._message.header
+        self._header.boot_id = boot_id
+        self._pose = self._message.pose
+
+    def encode(self, pose: Pose, published_ns: int, mapping: TimeMap) -> bytes:
+        """Return the message of a pose sent at `published_ns` (CLOCK_BOOTTIME)."""
+        header = self._header
+        header.sequence = pose.sequence
+        header.published_ns = published_ns
+        header.mapping.offset_ns = mapping.offset_ns
+        header.mapping.scale = mapping.scale
+        orientation = pose.orientation
+        message = self._pose
+        message.timestamp_ns = orientation.timestamp_ns
+        quaternion = message.orientation
+        quaternion.x, quaternion.y, quaternion.z, quaternion.w = orientation.quaternion
+        rate = message.angular_rate
+        rate.x, rate.y, rate.z = orientation.angular_rate
+        message.heading_accuracy = orientation.heading_accuracy
+        message.filter = pose.filter_name
+        message.status = int(orientation.status)
+        message.rate_mode = cast("pose_pb2.RateMode", pose.rate_mode)
+        message.events_fused = pose.events_fused
+        if pose.position is None:
+            message.ClearField("position")
+        else:
+            message.position.CopyFrom(_position(pose.position, orientation.timestamp_ns))
+        return self._message.SerializeToString()
 
 
 def truth(truth: Truth) -> pose_pb2.Truth:

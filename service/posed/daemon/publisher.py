@@ -35,6 +35,7 @@ class PosePublisher:
         self._clock = clock
         self._source = source
         self._statistics = statistics
+        self._encoder = encoding.PoseEncoder(boot_id)
         self._topics: set[bytes] = set()
         self.socket = xpub(context)
         bind_socket(self.socket, path)
@@ -60,9 +61,7 @@ class PosePublisher:
             now_ns = self._clock.now_ns()
             topic = encoding.pose_topic(pose.period_us)
             if topic in self._topics:
-                header = encoding.delivery_header(self._boot_id, pose.sequence, now_ns, mapping)
-                message = pose_pb2.PoseMessage(header=header, pose=encoding.pose(pose))
-                self.socket.send(topic + message.SerializeToString())
+                self.socket.send(topic + self._encoder.encode(pose, now_ns, mapping))
                 self._statistics.add(now_ns - mapping.to_boot(pose.instant_ns))
             topic = encoding.truth_topic(pose.period_us)
             if topic in self._topics:

@@ -27,7 +27,8 @@ class Waiter:
         self._timer = _timerfd_create()
         self._armed_ns: int | None = None
         self._epoll = select.epoll()
-        self._epoll.register(self._timer, select.EPOLLIN)
+        # Edge-triggered, a timer that went off need not be read: setting it anew starts from nothing.
+        self._epoll.register(self._timer, select.EPOLLIN | select.EPOLLET)
         for each in sockets:
             self.watch(each.fileno())
 
@@ -54,8 +55,6 @@ class Waiter:
         happened = False
         for fd, _ in self._epoll.poll():
             if fd == self._timer:
-                # A timer that went off is disarmed and, until read, readable.
-                os.read(self._timer, 8)
                 self._armed_ns = None
             else:
                 happened = True

@@ -84,8 +84,12 @@ class DcmFilter:
     def update_batch(self, events: Iterable[FlatEvent]) -> None:
         """Take events in the order given, each as by `update`."""
         take = self._take
+        take_rate = self._take_rate
         for sensor_type, timestamp_ns, x, y, z in events:
-            take(sensor_type, timestamp_ns, x, y, z)
+            if sensor_type == _GYROSCOPE:
+                take_rate(timestamp_ns, x, y, z)
+            else:
+                take(sensor_type, timestamp_ns, x, y, z)
 
     def orientation(self) -> Orientation | None:
         """Return the orientation C stands for, None until gravity and north have been seen."""
@@ -170,9 +174,10 @@ class DcmFilter:
         dt = (t - s.time_ns) * 1e-9
         s.has_gyro = True
         s.gyro_ns = t
-        s.rate_x = x - s.rest.bias_x
-        s.rate_y = y - s.rest.bias_y
-        s.rate_z = z - s.rest.bias_z
+        rest = s.rest
+        s.rate_x = x - rest.bias_x
+        s.rate_y = y - rest.bias_y
+        s.rate_z = z - rest.bias_z
         if s.held:
             held = s.held
             s.held = []
@@ -268,10 +273,7 @@ class DcmFilter:
             s.has_up = True
             s.tilt_variance = noise
         norm = sqrt(norm2)
-        c.up_x = x / norm
-        c.up_y = y / norm
-        c.up_z = z / norm
-        c.rebuild(0.0, 0.0, 0.0, 0.0)
+        c.rebuild(x / norm, y / norm, z / norm, 0.0, 0.0, 0.0, 0.0)
 
     def _correct_heading(self, t: int, x: float, y: float, z: float) -> None:
         """Correct the heading column by a magnetometer sample (Eq. 11, 13, 15), levelled by the fused row 3.
@@ -291,7 +293,10 @@ class DcmFilter:
         if not s.has_up:
             return
         norm2 = x * x + y * y + z * z
-        vertical = x * c.up_x + y * c.up_y + z * c.up_z
+        ux = c.up_x
+        uy = c.up_y
+        uz = c.up_z
+        vertical = x * ux + y * uy + z * uz
         horizontal2 = norm2 - vertical * vertical
         if not horizontal2 > _MIN_HORIZONTAL2 * norm2:
             self._flag_bad_sample()
@@ -315,12 +320,10 @@ class DcmFilter:
             # A tilt error e turns the levelled field by e tan(dip).
             s.heading_variance = noise + s.tilt_variance * vertical * vertical / horizontal2
         s.heading_ns = s.time_ns
-        c.rebuild(
-            gain,
-            (x - vertical * c.up_x) / horizontal,
-            (y - vertical * c.up_y) / horizontal,
-            (z - vertical * c.up_z) / horizontal,
-        )
+        x = (x - vertical * ux) / horizontal
+        y = (y - vertical * uy) / horizontal
+        z = (z - vertical * uz) / horizontal
+        c.rebuild(ux, uy, uz, gain, x, y, z)
 
     def _heading_variance(self) -> float:
         """Return the heading's variance now (rad2): what the bias adds grows with the square of time."""

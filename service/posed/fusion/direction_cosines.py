@@ -3,31 +3,45 @@
 from dataclasses import dataclass
 from math import cos, sin, sqrt
 
+_TURNS_TO_ROUNDING = 16
+"""Turns after which rounding is undone. It costs a fifth of a turn, and a turn loses 2e-16 at most."""
+
 
 @dataclass
 class DirectionCosines:
-    """The rotation matrix from device to world (ENU) by rows: east, north and up in device axes."""
+    """The rotation matrix from device to world (ENU) by rows: north and up in device axes; east is their product."""
 
-    east_x: float = 1.0
-    east_y: float = 0.0
-    east_z: float = 0.0
     north_x: float = 0.0
     north_y: float = 1.0
     north_z: float = 0.0
     up_x: float = 0.0
     up_y: float = 0.0
     up_z: float = 1.0
+    turns: int = 0
+    """Since rounding was last undone."""
+
+    @property
+    def east_x(self) -> float:
+        return self.north_y * self.up_z - self.north_z * self.up_y
+
+    @property
+    def east_y(self) -> float:
+        return self.north_z * self.up_x - self.north_x * self.up_z
+
+    @property
+    def east_z(self) -> float:
+        return self.north_x * self.up_y - self.north_y * self.up_x
 
     def rotate(self, x: float, y: float, z: float) -> None:
         """Turn the device by a rotation vector in its own axes (rad): C <- C exp([x y z]x), exactly (Rodrigues).
 
-        Patonis 2018, Eq. 3, which is its first order. Rows 2 and 3 are turned, row 1 is their product.
+        Patonis 2018, Eq. 3, which is its first order.
         """
         angle2 = x * x + y * y + z * z
         if angle2 < 1e-3:
             # Below 0.03 rad the series are exact to the last bit, cheaper, and free of the cancellation in 1 - cos.
-            a = 1.0 - angle2 * (1.0 - angle2 * (1.0 - angle2 / 42.0) / 20.0) / 6.0
-            b = 0.5 - angle2 * (1.0 - angle2 * (1.0 - angle2 / 56.0) / 30.0) / 24.0
+            a = 1.0 - angle2 * (1 / 6 - angle2 * (1 / 120 - angle2 * (1 / 5040)))
+            b = 0.5 - angle2 * (1 / 24 - angle2 * (1 / 720 - angle2 * (1 / 40320)))
         else:
             angle = sqrt(angle2)
             a = sin(angle) / angle
@@ -55,82 +69,54 @@ class DirectionCosines:
         x = self.up_x
         y = self.up_y
         z = self.up_z
-        ux = r00 * x + r01 * y + r02 * z
-        uy = r10 * x + r11 * y + r12 * z
-        uz = r20 * x + r21 * y + r22 * z
+        self.up_x = r00 * x + r01 * y + r02 * z
+        self.up_y = r10 * x + r11 * y + r12 * z
+        self.up_z = r20 * x + r21 * y + r22 * z
         x = self.north_x
         y = self.north_y
         z = self.north_z
-        nx = r00 * x + r01 * y + r02 * z
-        ny = r10 * x + r11 * y + r12 * z
-        nz = r20 * x + r21 * y + r22 * z
-        # Only rounding is to be undone here, so one step of Newton's iteration stands in for the square root.
-        scale = 1.5 - 0.5 * (ux * ux + uy * uy + uz * uz)
-        ux *= scale
-        uy *= scale
-        uz *= scale
-        lean = nx * ux + ny * uy + nz * uz
-        nx -= lean * ux
-        ny -= lean * uy
-        nz -= lean * uz
-        scale = 1.5 - 0.5 * (nx * nx + ny * ny + nz * nz)
-        nx *= scale
-        ny *= scale
-        nz *= scale
-        self.up_x = ux
-        self.up_y = uy
-        self.up_z = uz
-        self.north_x = nx
-        self.north_y = ny
-        self.north_z = nz
-        self.east_x = ny * uz - nz * uy
-        self.east_y = nz * ux - nx * uz
-        self.east_z = nx * uy - ny * ux
+        self.north_x = r00 * x + r01 * y + r02 * z
+        self.north_y = r10 * x + r11 * y + r12 * z
+        self.north_z = r20 * x + r21 * y + r22 * z
+        self.turns += 1
+        if self.turns == _TURNS_TO_ROUNDING:
+            self._undo_rounding()
 
-    def rebuild(self, gain: float, north_x: float, north_y: float, north_z: float) -> None:
-        """Correct the heading column towards a measured north (device axes) by `gain`, and build C from it and row 3.
+    def rebuild(
+        self, ux: float, uy: float, uz: float, gain: float, north_x: float, north_y: float, north_z: float
+    ) -> None:
+        """Build C from a new row 3 (unit vector u) and the heading column, corrected by `gain` towards a measured
+        north (device axes, unit vector, square to u; not looked at if `gain` is 0).
 
         The column follows the axis that is most nearly vertical, cyclically: z up takes x, x up takes y, y up takes z
-        (Patonis 2018, Fig. 1), so its axis is never further than 45 degrees from the horizon. With p that axis and u
-        row 3, v = e_p - C[2, p] u and w = u x e_p span the horizon and are equally long; rows 1 and 2 are the
-        combinations that reproduce the column: Eq. 1 without its angles.
+        (Patonis 2018, Fig. 1), so its axis is never further than 45 degrees from the horizon. With p that axis,
+        v = e_p - C[2, p] u and w = u x e_p span the horizon and are equally long; rows 1 and 2 are the combinations
+        that reproduce the column: Eq. 1 without its angles.
         """
-        ux = self.up_x
-        uy = self.up_y
-        uz = self.up_z
         across_x = abs(ux)
         across_y = abs(uy)
         across_z = abs(uz)
         if across_z >= across_x and across_z >= across_y:
-            east = self.east_x + gain * (north_y * uz - north_z * uy - self.east_x)
-            north = self.north_x + gain * (north_x - self.north_x)
-            vx = 1.0 - ux * ux
-            vy = -ux * uy
-            vz = -ux * uz
-            wx = 0.0
-            wy = uz
-            wz = -uy
-            length2 = vx
+            north = self.north_x
+            east = self.north_y * self.up_z - self.north_z * self.up_y
+            if gain > 0.0:
+                north += gain * (north_x - north)
+                east += gain * (north_y * uz - north_z * uy - east)
+            length2 = 1.0 - ux * ux
         elif across_x >= across_y:
-            east = self.east_y + gain * (north_z * ux - north_x * uz - self.east_y)
-            north = self.north_y + gain * (north_y - self.north_y)
-            vx = -ux * uy
-            vy = 1.0 - uy * uy
-            vz = -uy * uz
-            wx = -uz
-            wy = 0.0
-            wz = ux
-            length2 = vy
+            north = self.north_y
+            east = self.north_z * self.up_x - self.north_x * self.up_z
+            if gain > 0.0:
+                north += gain * (north_y - north)
+                east += gain * (north_z * ux - north_x * uz - east)
+            length2 = 1.0 - uy * uy
         else:
-            east = self.east_z + gain * (north_x * uy - north_y * ux - self.east_z)
-            north = self.north_z + gain * (north_z - self.north_z)
-            vx = -ux * uz
-            vy = -uy * uz
-            vz = 1.0 - uz * uz
-            wx = uy
-            wy = -ux
-            wz = 0.0
-            length2 = vz
+            north = self.north_z
+            east = self.north_x * self.up_y - self.north_y * self.up_x
+            if gain > 0.0:
+                north += gain * (north_z - north)
+                east += gain * (north_x * uy - north_y * ux - east)
+            length2 = 1.0 - uz * uz
         column2 = east * east + north * north
         if column2 < 1e-12:
             # Row 3 was just set afresh and the axis stood upright before: any heading will do, none is known.
@@ -139,12 +125,21 @@ class DirectionCosines:
         length = sqrt(length2 * column2)
         east /= length
         north /= length
-        self.east_x = east * vx - north * wx
-        self.east_y = east * vy - north * wy
-        self.east_z = east * vz - north * wz
-        self.north_x = north * vx + east * wx
-        self.north_y = north * vy + east * wy
-        self.north_z = north * vz + east * wz
+        self.up_x = ux
+        self.up_y = uy
+        self.up_z = uz
+        if across_z >= across_x and across_z >= across_y:
+            self.north_x = north * length2
+            self.north_y = east * uz - north * ux * uy
+            self.north_z = -east * uy - north * ux * uz
+        elif across_x >= across_y:
+            self.north_x = -east * uz - north * ux * uy
+            self.north_y = north * length2
+            self.north_z = east * ux - north * uy * uz
+        else:
+            self.north_x = east * uy - north * ux * uz
+            self.north_y = -east * ux - north * uy * uz
+            self.north_z = north * length2
 
     def quaternion(self) -> tuple[float, float, float, float]:
         """Return the rotation as (x, y, z, w), device to world, w >= 0.
@@ -154,19 +149,43 @@ class DirectionCosines:
         xx = self.east_x
         yy = self.north_y
         zz = self.up_z
+        east_y = self.east_y
+        east_z = self.east_z
         trace = xx + yy + zz
         x = self.up_y - self.north_z
-        y = self.east_z - self.up_x
-        z = self.north_x - self.east_y
+        y = east_z - self.up_x
+        z = self.north_x - east_y
         w = 1.0 + trace
         if trace < xx or trace < yy or trace < zz:
             if xx >= yy and xx >= zz:
-                x, y, z, w = 1.0 + xx - yy - zz, self.north_x + self.east_y, self.up_x + self.east_z, x
+                x, y, z, w = 1.0 + xx - yy - zz, self.north_x + east_y, self.up_x + east_z, x
             elif yy >= zz:
-                x, y, z, w = self.north_x + self.east_y, 1.0 - xx + yy - zz, self.up_y + self.north_z, y
+                x, y, z, w = self.north_x + east_y, 1.0 - xx + yy - zz, self.up_y + self.north_z, y
             else:
-                x, y, z, w = self.up_x + self.east_z, self.up_y + self.north_z, 1.0 - xx - yy + zz, z
+                x, y, z, w = self.up_x + east_z, self.up_y + self.north_z, 1.0 - xx - yy + zz, z
         norm = sqrt(x * x + y * y + z * z + w * w)
         if w < 0.0:
             norm = -norm
         return x / norm, y / norm, z / norm, w / norm
+
+    def _undo_rounding(self) -> None:
+        """Make the rows unit vectors square to each other again.
+
+        So little is to be undone that one step of Newton's iteration stands in for the square root.
+        """
+        self.turns = 0
+        ux = self.up_x
+        uy = self.up_y
+        uz = self.up_z
+        scale = 1.5 - 0.5 * (ux * ux + uy * uy + uz * uz)
+        self.up_x = ux = scale * ux
+        self.up_y = uy = scale * uy
+        self.up_z = uz = scale * uz
+        lean = self.north_x * ux + self.north_y * uy + self.north_z * uz
+        x = self.north_x - lean * ux
+        y = self.north_y - lean * uy
+        z = self.north_z - lean * uz
+        scale = 1.5 - 0.5 * (x * x + y * y + z * z)
+        self.north_x = scale * x
+        self.north_y = scale * y
+        self.north_z = scale * z

@@ -93,7 +93,8 @@ class RestBias:
             dx * dx + dy * dy + dz * dz > self._rate_deviation2
             or mean_x * mean_x + mean_y * mean_y + mean_z * mean_z > self._bias_limit2
         ):
-            self.moved()
+            s.still_s = 0.0
+            s.at_rest = False
         else:
             s.still_s += dt
             if s.still_s >= self._settle_s:

@@ -1,6 +1,5 @@
 """Read a TOML table strictly: every complaint names the file, the key, the value and what is allowed."""
 
-import difflib
 import itertools
 import math
 from collections.abc import Iterable, Mapping
@@ -114,6 +113,8 @@ class TomlTable:
 
 def close_match(word: str, words: Iterable[str]) -> str:
     """Return '; did you mean X?' for the word of `words` nearest to `word`, '' when none is near."""
+    import difflib  # only a mistake needs it, and the daemon's memory is counted
+
     close = difflib.get_close_matches(word, list(words), 1)
     return f"; did you mean {close[0]}?" if close else ""
 
