@@ -90,6 +90,7 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
     from posed.clock import BootClock
     from posed.daemon.publisher import PosePublisher
     from posed.daemon.statistics import PublicationStatistics
+    from posed.daemon.waiting import Waiter
     from posed.events import SensorType
     from posed.fusion import SensorNoise, make_filter
     from posed.hal import open_source
@@ -106,8 +107,10 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
     handles = [sensor.handle for sensor in source.sensors if sensor.type in inputs]
     ended = threading.Event()
     begin(ended.set)
+    waiter = Waiter((publisher.socket,))
+    readable = waiter.readable()
     while not ended.is_set():
-        if publisher.socket.poll(0):
+        if readable:
             publisher.read_subscriptions()
         service.advance()
         publisher.publish(service.take_poses())
@@ -115,8 +118,10 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
         if wake_per == "event":
             samples = (source.next_sample_ns(handle) for handle in handles)
             due = source.time_map.to_boot(min(sample for sample in samples if sample is not None))
-        # A poll would round to milliseconds and take events that are close together as one.
-        time.sleep(max(0, (due or 0) - clock.now_ns()) / 1e9)
+        readable = waiter.readable()
+        if not readable and waiter.wait(due):
+            readable = waiter.readable()
+    waiter.close()
     publisher.close()
     return {"poses": statistics.published, "events": service.events_fused}
 

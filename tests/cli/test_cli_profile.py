@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import select
+import shutil
 import subprocess
 import sys
 import time
@@ -285,3 +287,26 @@ def test_a_daemon_that_does_not_start_is_said(tmp_path: Path) -> None:
     done = _profile(tmp_path, "--source", "replay:/does/not/exist.csv")
     assert done.returncode == 69
     assert "did not start: /does/not/exist.csv cannot be read" in done.stderr
+
+
+_MEASURER = """\
+from posed.cli.profiling.daemons import PrivateDaemon
+with PrivateDaemon(["--source=sim:still"]) as daemon:
+    print(daemon.pid, daemon.runtime_base, flush=True)
+    input()
+"""
+
+
+def test_a_daemon_that_is_measured_ends_with_a_measurer_that_is_killed() -> None:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", _MEASURER], text=True, **pipes) as measurer:
+        assert measurer.stdout is not None
+        pid, runtime_base = measurer.stdout.readline().split()
+        daemon = os.pidfd_open(int(pid))
+        try:
+            measurer.kill()
+            ended, _, _ = select.select([daemon], [], [], 10.0)
+            assert ended == [daemon]
+        finally:
+            os.close(daemon)
+            shutil.rmtree(runtime_base)

@@ -57,6 +57,7 @@ class Desk:
         """Start a process that is ended with the test."""
         process = subprocess.Popen(
             command,
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
@@ -79,8 +80,9 @@ class Desk:
                 process.send_signal(signal.SIGCONT)
             process.kill()
             process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
+            for pipe in (process.stdin, process.stdout):
+                if pipe is not None:
+                    pipe.close()
         shutil.rmtree(self.directory)
 
 

@@ -2,9 +2,9 @@
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -123,20 +123,27 @@ def test_a_second_daemon_refuses_and_leaves_the_first_alone(desk: Any) -> None:
         assert client.poses_missed == 0
 
 
-def test_ten_clients_binding_at_once_start_one_daemon(desk: Any) -> None:
-    def first_boot_id(_: int) -> bytes:
-        client = PoseClient(auto_create=True)
-        clients.append(client)
-        pose = client.next_pose(timeout_s=20)
-        assert pose is not None
-        return pose.delivery.boot_id
+_BIND_AND_SAY_WHICH_DAEMON = """
+import sys
+from posed.client import PoseClient
+sys.stdin.readline()
+with PoseClient(auto_create=True) as client:
+    print(client.next_pose(timeout_s=20).delivery.boot_id.hex(), flush=True)
+    sys.stdin.readline()
+"""
 
-    clients: list[PoseClient] = []
-    with ThreadPoolExecutor(10) as pool:
-        boot_ids = set(pool.map(first_boot_id, range(10)))
-    for client in clients:
-        client.close()
+
+def test_ten_processes_binding_at_once_start_one_daemon(desk: Any) -> None:
+    clients = [desk.spawn([sys.executable, "-c", _BIND_AND_SAY_WHICH_DAEMON]) for _ in range(10)]
+    for line in ("bind", "unbind"):
+        for client in clients:
+            client.stdin.write(f"{line}\n")
+            client.stdin.flush()
+        if line == "bind":
+            boot_ids = {client.stdout.readline() for client in clients}
+    assert [client.wait(timeout=10) for client in clients] == [0] * 10
     assert len(boot_ids) == 1
+    assert boot_ids != {""}
 
 
 def test_a_daemon_that_cannot_start_is_named_to_the_client_that_wants_it(

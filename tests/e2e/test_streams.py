@@ -261,6 +261,17 @@ def test_gravity_and_linear_acceleration_add_up_to_the_accelerometer(desk: Any) 
 
 def test_the_poses_of_a_fast_replay_equal_those_of_fuse(desk: Any, tmp_path: Path) -> None:
     recording = _recording(tmp_path / "turn.csv", 20)
+    last = _replay_and_compare(desk, recording)
+    assert math.degrees(last.azimuth) % 360 == pytest.approx(-20 * 18 % 360, abs=5)
+
+
+def test_the_poses_of_a_replayed_trial_equal_those_of_fuse(desk: Any, data_dir: Path) -> None:
+    trials = sorted((data_dir / "smartphone-attitude" / "trials").iterdir())
+    _replay_and_compare(desk, trials[0])
+
+
+def _replay_and_compare(desk: Any, recording: Path) -> Pose:
+    """Compare every pose that a client gets at ten times real time with the one of `posed fuse`; return the last."""
     fused = desk.posed("fuse", str(recording), "--mode", "GAME")
     assert fused.returncode == 0, fused.stderr
     assert desk.posed("fuse", str(recording), "--mode", "GAME").stdout == fused.stdout
@@ -285,4 +296,4 @@ def test_the_poses_of_a_fast_replay_equal_those_of_fuse(desk: Any, tmp_path: Pat
             int(row["events_fused"]),
             row["filter"],
         )
-    assert math.degrees(received[-1].azimuth) % 360 == pytest.approx(-20 * 18 % 360, abs=5)
+    return received[-1]

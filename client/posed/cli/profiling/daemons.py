@@ -1,8 +1,10 @@
 """The daemons that are measured: one started for the purpose, or the user's own."""
 
 import contextlib
+import ctypes
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -17,6 +19,8 @@ from posed.errors import ServiceUnavailableError
 from posed.proto import binder_pb2, sensors_pb2
 
 _READY_TIMEOUT_S = 20.0
+_PR_SET_PDEATHSIG = 1
+_libc = ctypes.CDLL(None)
 
 
 class Daemon:
@@ -82,6 +86,7 @@ class PrivateDaemon(Daemon):
                 stdout=log,
                 stderr=log,
                 env=self.environment(),
+                preexec_fn=_end_with_parent,
             )
         try:
             self._await_ready()
@@ -124,3 +129,8 @@ class PrivateDaemon(Daemon):
                         f"the daemon to be measured was not ready after {_READY_TIMEOUT_S:.0f} s"
                     )
                 time.sleep(0.02)
+
+
+def _end_with_parent() -> None:
+    """Have the kernel end this process, just forked, with the one that measures, which may be killed (prctl(2))."""
+    _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)

@@ -54,9 +54,8 @@ def save_plot(report: Report, path: Path) -> None:
         (ours, [each.events_per_s.median for each in report.modes.values()]),
         (papers, [PAPER[mode].events_per_s for mode in modes]),
     ):
-        axes.set_xticks(
-            range(len(modes)), [f"{mode}\n{rate:.0f} events/s" for mode, rate in zip(modes, rates, strict=True)]
-        )
+        axes.set_xticks(range(len(modes)), [f"{mode}\n{rate:.0f}/s" for mode, rate in zip(modes, rates, strict=True)])
+        axes.set_xlabel("mode, sensor events")
         axes.set_ylim(bottom=0)
     figure.supxlabel(f"{PAPER_CAPTION}\nhere: {report.machine['cpu_model']}, idle subtracted", fontsize="small")
     try:

@@ -130,7 +130,7 @@ def machine() -> dict[str, Any]:
     return {
         "cpu_model": _cpu_model(),
         "cores": os.cpu_count(),
-        "kernel": platform.release(),
+        "kernel": platform.release().partition("-")[0],
         "python": platform.python_version(),
         "libzmq": zmq.zmq_version(),
         "protobuf": google.protobuf.__version__,
