@@ -35,7 +35,8 @@ def matrix(quaternion: Float64Array) -> Float64Array:
 
 
 def test_names() -> None:
-    assert set(NAMES) == {"still", "turn-x", "turn-y", "turn-z", "look-around", "walk", "shake", "magnet"}
+    held = {"look-around", "returns", "compass", "pan", "walk", "shake"}
+    assert set(NAMES) == {"still", "turn-x", "turn-y", "turn-z", "magnet", *held}
     with pytest.raises(InvalidArgumentError, match=r"'wlak' is unknown; allowed: look-around, .*; did you mean walk\?"):
         make_script("wlak", 0)
 
@@ -115,7 +116,7 @@ def test_still_lies_flat_towards_the_north() -> None:
     np.testing.assert_array_equal(make_script("still", 0).attitude(np.array([0.0, 1e5])), [[0, 0, 0, 1], [0, 0, 0, 1]])
 
 
-@pytest.mark.parametrize("name", ["look-around", "walk", "shake"])
+@pytest.mark.parametrize("name", ["look-around", "returns", "compass", "pan", "walk", "shake"])
 def test_camera_comes_to_look_at_every_target(name: str) -> None:
     script = make_script(name, 5)
     camera = -matrix(script.attitude(times(0.0, 330.0)[::20]))[:, :, 2]
@@ -138,6 +139,25 @@ def test_look_around_returns() -> None:
     camera = -matrix(script.attitude(times(0.0, 330.0)[::100]))[:, :, 2]
     north = camera[:, 1] > math.cos(math.radians(5))
     assert np.count_nonzero(np.diff(north.astype(int)) == 1) >= 3
+
+
+def test_returns_looks_at_each_of_three_targets_twenty_times() -> None:
+    script = make_script("returns", 5)
+    camera = -matrix(script.attitude(times(0.0, 331.0)[::100]))[:, :, 2]
+    assert len(script.targets) == 3
+    for target in script.targets:
+        level = math.cos(target.elevation)
+        towards = [level * math.sin(target.heading), level * math.cos(target.heading), math.sin(target.elevation)]
+        on_target = camera @ towards > math.cos(math.radians(5))
+        assert np.count_nonzero(np.diff(on_target.astype(int)) == 1) == 20
+
+
+@pytest.mark.parametrize(("name", "degrees_per_s"), [("compass", 15.0), ("pan", 100.0)])
+def test_a_pan_turns_right_at_one_rate(name: str, degrees_per_s: float) -> None:
+    rotations = matrix(make_script(name, 5).attitude(times(8.0, 80.0)[::1000]))
+    heading = np.unwrap(np.arctan2(-rotations[:, 0, 2], -rotations[:, 1, 2]))
+    rate = np.degrees(heading[-1] - heading[0]) / (len(heading) - 1)
+    assert rate == pytest.approx(degrees_per_s, abs=0.1)
 
 
 def test_walk_makes_1_8_steps_a_second_at_walking_speed() -> None:

@@ -273,10 +273,12 @@ def test_malformed_value_names_file_key_value_and_what_is_allowed(
             "a matrix that can be inverted",
         ),
         ("[calibration.magnetic_field]\nbias = [1, 2, 3]", "unknown key calibration.magnetic_field.bias", "hard_iron"),
+        ("[camera]\nfov_deg = 180", "camera.fov_deg = 180", "less than 180"),
+        ("[screen]\nrotation_deg = 45", "screen.rotation_deg = 45", "0, 90, 180 or 270"),
         ("[calibration.compass]", "unknown key calibration.compass", "accelerometer, gyroscope, magnetic_field"),
     ],
 )
-def test_malformed_error_and_calibration_tables(tmp_path: Path, added: str, key: str, allowed: str) -> None:
+def test_malformed_optional_tables(tmp_path: Path, added: str, key: str, allowed: str) -> None:
     file = write(tmp_path, f"{MINIMAL}\n{added}\n")
     with pytest.raises(ProfileError) as raised:
         load_profile(file)
@@ -284,6 +286,13 @@ def test_malformed_error_and_calibration_tables(tmp_path: Path, added: str, key:
     assert message.startswith(f"{file}: ")
     assert key in message
     assert allowed in message
+
+
+def test_camera_and_screen(tmp_path: Path) -> None:
+    phone = load_profile(write(tmp_path, f"{MINIMAL}\n[camera]\nfov_deg = 80\n[screen]\nrotation_deg = 270\n"))
+    assert (phone.camera_fov_deg, phone.screen_rotation_deg) == (80.0, 270)
+    plain = load_profile(write(tmp_path, MINIMAL))
+    assert (plain.camera_fov_deg, plain.screen_rotation_deg) == (67.0, 0)
 
 
 def test_unknown_key_names_the_allowed_ones_and_the_nearest(tmp_path: Path) -> None:

@@ -215,8 +215,7 @@ class _LookAround(_Hand):
         arm = np.stack([sine.second, cosine.second, np.zeros_like(t)], axis=1)
         return super().acceleration(t) + self._ARM_M * arm
 
-    @staticmethod
-    def _visits(rng: SeededRandom) -> list[int]:
+    def _visits(self, rng: SeededRandom) -> list[int]:
         """Return which targets are looked at, north first and last, none twice in a row: about five minutes."""
         visits = [0]
         for _ in range(6):
@@ -227,6 +226,31 @@ class _LookAround(_Hand):
                 if rng.number(0.0, 1.0) < 0.3:
                     visits.append(visits[-2])
         return [*visits[1:], 0] if visits[-1] else visits[1:]
+
+
+class _Returns(_LookAround):
+    """The same user, who compares three objects with their overlay: one after the other, twenty times."""
+
+    targets = tuple(target for target in _TARGETS if target.name in ("tower", "roof", "hill"))
+
+    def _visits(self, rng: SeededRandom) -> list[int]:
+        return [_TARGETS.index(target) for target in self.targets] * 20 + [0]
+
+
+class _Pan(_Hand):
+    """A phone turned right without end about the one who holds it, at one rate once it is under way."""
+
+    targets = tuple(target for target in _TARGETS if target.elevation == 0.0)
+    _UNDER_WAY_S = 1.0
+
+    def __init__(self, rng: SeededRandom, degrees_per_s: float) -> None:
+        super().__init__(rng)
+        self._rate = math.radians(degrees_per_s)
+
+    def attitude(self, t: Float64Array) -> Float64Array:
+        # The rate grows as 1 - exp(-t / T), so that a filter begins with a phone that rests.
+        run_up = self._UNDER_WAY_S * -np.expm1(-t / self._UNDER_WAY_S)
+        return self._held(t, self._rate * (t - run_up), np.zeros_like(t))
 
 
 class _Walk(_Hand):
@@ -343,6 +367,9 @@ _SCRIPTS: dict[str, Callable[[SeededRandom], MotionScript]] = {
     "turn-x": lambda rng: _Turn(0, 1.0),
     "turn-y": lambda rng: _Turn(1, -1.0),
     "turn-z": lambda rng: _Turn(2, -1.0),
+    "returns": _Returns,
+    "compass": lambda rng: _Pan(rng, 15.0),
+    "pan": lambda rng: _Pan(rng, 100.0),
     "walk": _Walk,
     "shake": _Shake,
     "magnet": _Magnet,

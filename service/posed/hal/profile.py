@@ -116,6 +116,10 @@ class DeviceProfile:
     description: str
     sensors: Mapping[SensorType, SensorProfile]
     calibration: Mapping[SensorType, Calibration]
+    camera_fov_deg: float = 67.0
+    """Field of view of the back camera along the longer side of its image; the default is a 26 mm lens's."""
+    screen_rotation_deg: int = 0
+    """How the phone is used: 0, 90, 180 or 270 from its natural orientation (Display.getRotation)."""
 
     def sensor_infos(self) -> tuple[SensorInfo, ...]:
         """Return the sensors as Android lists them, in handle order: three parts, each also uncalibrated.
@@ -221,9 +225,16 @@ def _parse(file: str, content: bytes) -> DeviceProfile:
     sensors = {kind: _read_sensor(kind, root.table(kind.name.lower(), required=True)) for kind in UNCALIBRATED_TYPE}
     tables = root.table("calibration")
     calibration = {kind: _read_calibration(kind, tables.table(kind.name.lower())) for kind in UNCALIBRATED_TYPE}
-    tables.finish()
-    root.finish()
-    return DeviceProfile(name, description, sensors, calibration)
+    camera, screen = root.table("camera"), root.table("screen")
+    fov_deg = camera.number("fov_deg", positive=True, default=DeviceProfile.camera_fov_deg)
+    if fov_deg >= 180.0:
+        raise camera.refusal("fov_deg", fov_deg, "more than 0 and less than 180")
+    rotation_deg = screen.integer("rotation_deg", low=0, default=0)
+    if rotation_deg not in (0, 90, 180, 270):
+        raise screen.refusal("rotation_deg", rotation_deg, "0, 90, 180 or 270")
+    for table in (tables, camera, screen, root):
+        table.finish()
+    return DeviceProfile(name, description, sensors, calibration, fov_deg, rotation_deg)
 
 
 def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:
