@@ -12,15 +12,12 @@ import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
+from simulation import axes, raw_axes, simulate
 
-from posed.clock import VirtualClock
-from posed.events import EventColumn, Float64Array, Int64Array, RateMode, SensorType
+from posed.events import Float64Array
 from posed.fusion import SensorNoise
 from posed.fusion.dcm import DcmFilter, DcmParams
-from posed.hal import open_source
 from posed.hal.profile import load_profile
-from posed.hal.source import SensorSource
-from posed.sensors import SensorService
 
 ANGLES = ("heading", "pitch", "roll")
 WARM_UP_S = 30.0
@@ -34,25 +31,6 @@ def orientation_angles(east: Float64Array, north: Float64Array, up: Float64Array
     return np.asarray(np.degrees(np.stack([azimuth, pitch, roll], axis=1)))
 
 
-def of_quaternions(q: Float64Array) -> Float64Array:
-    """Return azimuth, pitch and roll, deg[n, 3], of (x, y, z, w) rows."""
-    x, y, z, w = q.T
-    east = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=1)
-    north = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=1)
-    up = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=1)
-    return orientation_angles(east, north, up)
-
-
-def of_raw(accelerometer: EventColumn, magnetometer: EventColumn) -> Float64Array:
-    """Return azimuth, pitch and roll, deg[n, 3], at each magnetometer event (SensorManager.getRotationMatrix)."""
-    newest = np.searchsorted(accelerometer.timestamp_ns, magnetometer.timestamp_ns).clip(0, len(accelerometer) - 1)
-    up = accelerometer.values[newest]
-    up = up / np.linalg.norm(up, axis=1, keepdims=True)
-    east = np.cross(magnetometer.values, up)
-    east = east / np.linalg.norm(east, axis=1, keepdims=True)
-    return orientation_angles(east, np.cross(up, east), up)
-
-
 @dataclass(frozen=True)
 class Run:
     """What came out of one script after the warm-up: angles in deg[n, 3], and how far off the vertical was, deg[n]."""
@@ -63,50 +41,22 @@ class Run:
     fused_tilt_error: Float64Array
 
 
-def run(script: str, seconds: float, params: DcmParams, seed: int = 0) -> Run:
+def run(script: str, seconds: float, params: DcmParams) -> Run:
     """Put the simulated tablet through a script and fuse it."""
-    clock = VirtualClock(1_000_000_000)
-    source = open_source(f"sim:{script}", load_profile("patonis2018"), clock, seed=seed)
-    service = SensorService(source, DcmFilter(params), clock)
-    listener = service.connect()
-    service.register_pose("benchmark", 100_000, RateMode.FASTEST.sampling_period_us)
-    for kind in (SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD):
-        service.enable(listener, int(kind), 0, 0)
-    columns: dict[int, list[EventColumn]] = {}
-    poses = []
-    start_ns = clock.now_ns()
-    for second in range(1, int(WARM_UP_S + seconds) + 1):
-        clock.advance_to(start_ns + second * 1_000_000_000)
-        service.advance()
-        while listener:
-            for handle, column in listener.take(10_000).columns.items():
-                columns.setdefault(handle, []).append(column)
-        poses += service.take_poses()
-    begin_ns = start_ns + int(WARM_UP_S * 1e9)
-    accelerometer, magnetometer = (
-        EventColumn.concatenate(columns[int(kind)]) for kind in (SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD)
-    )
-    late = slice(int(np.searchsorted(magnetometer.timestamp_ns, begin_ns)), None)
-    accelerometer_late = accelerometer[slice(int(np.searchsorted(accelerometer.timestamp_ns, begin_ns)), None)]
-    poses = [pose for pose in poses if pose.instant_ns >= begin_ns]
-    quaternions = np.array([pose.orientation.quaternion for pose in poses])
+    done = simulate(script, seconds, lambda: DcmFilter(params), warm_up_s=WARM_UP_S)
+    fused = axes(done.quaternions)
+    _, _, true_up = axes(done.truth(done.accelerometer.timestamp_ns))
+    _, _, true_up_of_poses = axes(done.truth(np.array([pose.orientation.timestamp_ns for pose in done.poses])))
     return Run(
-        of_raw(accelerometer, magnetometer)[late],
-        of_quaternions(quaternions),
-        _tilt_error(source, accelerometer_late.timestamp_ns, accelerometer_late.values),
-        _tilt_error(source, np.array([pose.orientation.timestamp_ns for pose in poses]), _up(quaternions)),
+        orientation_angles(*raw_axes(done.accelerometer, done.magnetometer)),
+        orientation_angles(*fused),
+        _angle_deg(done.accelerometer.values, true_up),
+        _angle_deg(fused[2], true_up_of_poses),
     )
 
 
-def _up(q: Float64Array) -> Float64Array:
-    x, y, z, w = q.T
-    return np.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=1)
-
-
-def _tilt_error(source: SensorSource, times: Int64Array, up: Float64Array) -> Float64Array:
-    """Return the angle (deg) between a measured vertical and the true one, both in device axes."""
-    truths = [source.truth(int(t)) for t in times]
-    true = _up(np.array([truth.quaternion for truth in truths if truth is not None]))
+def _angle_deg(up: Float64Array, true: Float64Array) -> Float64Array:
+    """Return the angles (deg) between measured verticals, of any length, and the true ones, all in device axes."""
     cosine = np.sum(up * true, axis=1) / np.linalg.norm(up, axis=1)
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
 
