@@ -156,12 +156,16 @@ def plot_axes(path: Path) -> None:
     figure = Figure(figsize=(12.0, 4.5), layout="constrained")
     for column, script in enumerate(TURNS):
         done = simulate(script, 40, _filter, warm_up_s=_WARM_UP_S)
-        plot = figure.add_subplot(1, 3, column + 1, projection="3d")
+        plot = figure.add_subplot(1, 3, column + 1, projection="3d", computed_zorder=False)
         world = np.stack(axes(done.quaternions), axis=1)  # [pose, world axis, device axis]
-        for axis, (name, colour) in enumerate((("x", "tab:red"), ("y", "tab:green"), ("z", "tab:blue"))):
-            plot.scatter(*world[:, :, axis].T, s=6, color=colour, label=name, depthshade=False)
-        plot.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1), xlabel="east", ylabel="north", zlabel="up")
-        plot.set_box_aspect((1, 1, 1))
+        # Two axes go through the same places: one is drawn larger, so that both are seen.
+        for axis, (name, colour, size) in enumerate(
+            (("x", "tab:red", 5), ("y", "tab:green", 30), ("z", "tab:blue", 12))
+        ):
+            plot.scatter(*world[:, :, axis].T, s=size, color=colour, label=name, depthshade=False, zorder=3 - size)
+        limits = {f"{axis}{what}": value for axis in "xyz" for what, value in (("lim", (-1, 1)), ("ticks", (-1, 0, 1)))}
+        plot.set(**limits, xlabel="east", ylabel="north", zlabel="up")
+        plot.set_box_aspect((1, 1, 1), zoom=0.85)
         plot.set_title(f"turned about {script[-1]}")
         plot.legend(title="device axis", loc="upper left")
     figure.savefig(path)
