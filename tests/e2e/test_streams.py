@@ -16,6 +16,7 @@ from posed.client import (
     SENSOR_DELAY_GAME,
     SENSOR_DELAY_NORMAL,
     SENSOR_DELAY_UI,
+    Device,
     Pose,
     PoseClient,
     Sensor,
@@ -143,9 +144,19 @@ def test_the_truth_stream_stands_beside_the_poses(desk: Any) -> None:
     assert pose is not None
     truth = truths[pose.sequence]
     assert truth.timestamp_ns == pose.timestamp_ns
+    assert 0 <= truth.instant_ns - truth.timestamp_ns <= 25_000_000
+    assert truth.instant_quaternion == pytest.approx(truth.quaternion, abs=0.05)
+    assert truth.instant_position_enu == truth.position_enu == (0.0, 0.0, 0.0)
     dot = abs(sum(a * b for a, b in zip(truth.quaternion, pose.quaternion, strict=True)))
     # The truth is against true north, the pose against magnetic north.
     assert math.degrees(2 * math.acos(min(1, dot))) == pytest.approx(math.degrees(truth.declination), abs=3)
+
+
+def test_a_client_learns_what_phone_it_is(desk: Any) -> None:
+    desk.serve("--source", "sim:still", "--profile", "modern")
+    with PoseClient() as client:
+        client.wait_connected(5)
+        assert client.device == Device("modern", 67.0, 0)
 
 
 def test_the_sensor_list_is_the_profiles_with_the_fused_sensors_behind(desk: Any) -> None:

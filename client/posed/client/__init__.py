@@ -1,6 +1,6 @@
 """The SDK: poses and sensor events of a running posed, in Android's vocabulary."""
 
-from posed.client.pose import Pose, PoseStatus, Position, Truth
+from posed.client.pose import Device, Pose, PoseStatus, Position, Truth
 from posed.client.pose_client import PoseClient
 from posed.client.sensor import (
     SENSOR_DELAY_FASTEST,
@@ -19,6 +19,7 @@ __all__ = [
     "SENSOR_DELAY_GAME",
     "SENSOR_DELAY_NORMAL",
     "SENSOR_DELAY_UI",
+    "Device",
     "Pose",
     "PoseClient",
     "PoseStatus",

@@ -47,6 +47,19 @@ class Delivery:
 
 
 @dataclass(frozen=True, slots=True)
+class Device:
+    """The phone that the daemon acts as.
+
+    camera_fov_deg: along the longer side of the image. screen_rotation_deg: 0, 90, 180 or 270 from the natural
+    orientation (Display.getRotation).
+    """
+
+    profile: str
+    camera_fov_deg: float
+    screen_rotation_deg: int
+
+
+@dataclass(frozen=True, slots=True)
 class Position:
     """WGS 84 degrees, metres above the ellipsoid, ENU covariance (m2, row-major) and velocity (m/s)."""
 
@@ -61,25 +74,34 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The true orientation beside a pose: (x, y, z, w), device to world ENU, true north; declination in rad, east +."""
+    """The true orientation beside a pose: (x, y, z, w), device to world ENU, true north; declination in rad, east +.
+
+    First at the pose's own timestamp, which tells the filter's error; then at its grid instant, which is what a camera
+    sees. Positions are in metres from where the motion began. None where unknown.
+    """
 
     delivery: Delivery
     timestamp_ns: int
     quaternion: tuple[float, float, float, float]
     declination: float
     position_enu: tuple[float, float, float] | None
+    instant_ns: int
+    instant_quaternion: tuple[float, float, float, float] | None
+    instant_position_enu: tuple[float, float, float] | None
 
     @classmethod
     def of_message(cls, message: pose_pb2.TruthMessage) -> "Truth":
         """Return the truth that a TruthMessage holds."""
         truth = message.truth
-        enu = truth.position_enu
         return cls(
             Delivery.of_message(message.header),
             truth.timestamp_ns,
             _quaternion(truth.orientation),
             truth.declination,
-            (enu.x, enu.y, enu.z) if truth.HasField("position_enu") else None,
+            _vector(truth.position_enu) if truth.HasField("position_enu") else None,
+            truth.instant_ns,
+            _quaternion(truth.instant_orientation) if truth.HasField("instant_orientation") else None,
+            _vector(truth.instant_position_enu) if truth.HasField("instant_position_enu") else None,
         )
 
 
@@ -170,6 +192,10 @@ class Pose:
         """Heading of the back camera's optical axis (device -z), rad, 0 to 2 pi; meaningless looking straight down."""
         r = self.rotation_matrix
         return math.atan2(-r[2], -r[5]) % (2 * math.pi)
+
+
+def _vector(v: pose_pb2.Vector3) -> tuple[float, float, float]:
+    return (v.x, v.y, v.z)
 
 
 def _quaternion(q: pose_pb2.Quaternion) -> tuple[float, float, float, float]:

@@ -11,7 +11,7 @@ import zmq
 from posed.binder.runtime import endpoint, pose_path
 from posed.binder.sockets import Socket, sub
 from posed.binder.stub import Caller, Stub
-from posed.client.pose import Pose, Truth, boot_time_ns
+from posed.client.pose import Device, Pose, Truth, boot_time_ns
 from posed.client.sensor import SENSOR_DELAY_GAME, period_of_delay_us
 from posed.client.service import Service, ServiceState, call_back
 from posed.errors import InvalidArgumentError, ServiceUnavailableError
@@ -59,6 +59,7 @@ class PoseClient:
         self._sockets: list[Socket] = []
         self._topic = b""
         self._rate_mode: str | None = None
+        self._device: Device | None = None
         self._service = Service(
             self,
             auto_create=auto_create,
@@ -96,6 +97,11 @@ class PoseClient:
     def rate_mode(self) -> str | None:
         """The rate mode in force in the daemon, the fastest that any client asks for; None before the first bind."""
         return self._rate_mode
+
+    @property
+    def device(self) -> Device | None:
+        """The phone that the daemon acts as; None before the first bind."""
+        return self._device
 
     @property
     def poses_received(self) -> int:
@@ -177,6 +183,8 @@ class PoseClient:
             )
         )
         self._configured(registration.configuration)
+        device = registration.device
+        self._device = Device(device.profile, device.camera_fov_deg, device.screen_rotation_deg)
         if registration.pose_topic == self._topic:
             return
         self.release(self._service)

@@ -39,14 +39,26 @@ class UnregisterPoseRequest(_message.Message):
     def __init__(self, listener: _Optional[str] = ...) -> None: ...
 
 class PoseRegistration(_message.Message):
-    __slots__ = ("pose_topic", "truth_topic", "configuration")
+    __slots__ = ("pose_topic", "truth_topic", "configuration", "device")
     POSE_TOPIC_FIELD_NUMBER: _ClassVar[int]
     TRUTH_TOPIC_FIELD_NUMBER: _ClassVar[int]
     CONFIGURATION_FIELD_NUMBER: _ClassVar[int]
+    DEVICE_FIELD_NUMBER: _ClassVar[int]
     pose_topic: bytes
     truth_topic: bytes
     configuration: PoseConfiguration
-    def __init__(self, pose_topic: _Optional[bytes] = ..., truth_topic: _Optional[bytes] = ..., configuration: _Optional[_Union[PoseConfiguration, _Mapping]] = ...) -> None: ...
+    device: Device
+    def __init__(self, pose_topic: _Optional[bytes] = ..., truth_topic: _Optional[bytes] = ..., configuration: _Optional[_Union[PoseConfiguration, _Mapping]] = ..., device: _Optional[_Union[Device, _Mapping]] = ...) -> None: ...
+
+class Device(_message.Message):
+    __slots__ = ("profile", "camera_fov_deg", "screen_rotation_deg")
+    PROFILE_FIELD_NUMBER: _ClassVar[int]
+    CAMERA_FOV_DEG_FIELD_NUMBER: _ClassVar[int]
+    SCREEN_ROTATION_DEG_FIELD_NUMBER: _ClassVar[int]
+    profile: str
+    camera_fov_deg: float
+    screen_rotation_deg: int
+    def __init__(self, profile: _Optional[str] = ..., camera_fov_deg: _Optional[float] = ..., screen_rotation_deg: _Optional[int] = ...) -> None: ...
 
 class PoseConfiguration(_message.Message):
     __slots__ = ("rate_mode", "sampling_period_us", "filter")
@@ -137,13 +149,19 @@ class TruthMessage(_message.Message):
     def __init__(self, header: _Optional[_Union[_events_pb2.DeliveryHeader, _Mapping]] = ..., truth: _Optional[_Union[Truth, _Mapping]] = ...) -> None: ...
 
 class Truth(_message.Message):
-    __slots__ = ("timestamp_ns", "orientation", "declination", "position_enu")
+    __slots__ = ("timestamp_ns", "orientation", "declination", "position_enu", "instant_ns", "instant_orientation", "instant_position_enu")
     TIMESTAMP_NS_FIELD_NUMBER: _ClassVar[int]
     ORIENTATION_FIELD_NUMBER: _ClassVar[int]
     DECLINATION_FIELD_NUMBER: _ClassVar[int]
     POSITION_ENU_FIELD_NUMBER: _ClassVar[int]
+    INSTANT_NS_FIELD_NUMBER: _ClassVar[int]
+    INSTANT_ORIENTATION_FIELD_NUMBER: _ClassVar[int]
+    INSTANT_POSITION_ENU_FIELD_NUMBER: _ClassVar[int]
     timestamp_ns: int
     orientation: Quaternion
     declination: float
     position_enu: Vector3
-    def __init__(self, timestamp_ns: _Optional[int] = ..., orientation: _Optional[_Union[Quaternion, _Mapping]] = ..., declination: _Optional[float] = ..., position_enu: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...
+    instant_ns: int
+    instant_orientation: Quaternion
+    instant_position_enu: Vector3
+    def __init__(self, timestamp_ns: _Optional[int] = ..., orientation: _Optional[_Union[Quaternion, _Mapping]] = ..., declination: _Optional[float] = ..., position_enu: _Optional[_Union[Vector3, _Mapping]] = ..., instant_ns: _Optional[int] = ..., instant_orientation: _Optional[_Union[Quaternion, _Mapping]] = ..., instant_position_enu: _Optional[_Union[Vector3, _Mapping]] = ...) -> None: ...

@@ -64,17 +64,20 @@ class PoseEncoder:
         return self._message.SerializeToString()
 
 
-def truth(truth: Truth) -> pose_pb2.Truth:
-    """Return a truth as its message."""
-    x, y, z, w = truth.quaternion
+def truth(truth: Truth, instant_ns: int, at_instant: Truth | None) -> pose_pb2.Truth:
+    """Return the truth at a pose's sample time, and at its grid instant, as a message."""
     message = pose_pb2.Truth(
         timestamp_ns=truth.timestamp_ns,
-        orientation=pose_pb2.Quaternion(x=x, y=y, z=z, w=w),
+        orientation=_quaternion(truth),
         declination=truth.declination,
+        position_enu=_position_enu(truth),
+        instant_ns=instant_ns,
     )
-    if truth.position_enu is not None:
-        east, north, up = truth.position_enu
-        message.position_enu.CopyFrom(pose_pb2.Vector3(x=east, y=north, z=up))
+    if at_instant is not None:
+        message.instant_orientation.CopyFrom(_quaternion(at_instant))
+        position = _position_enu(at_instant)
+        if position is not None:
+            message.instant_position_enu.CopyFrom(position)
     return message
 
 
@@ -137,3 +140,15 @@ def _position(position: Position, timestamp_ns: int) -> pose_pb2.Position:
     if position.timestamp_ns is not None:
         message.age_ns = timestamp_ns - position.timestamp_ns
     return message
+
+
+def _quaternion(truth: Truth) -> pose_pb2.Quaternion:
+    x, y, z, w = truth.quaternion
+    return pose_pb2.Quaternion(x=x, y=y, z=z, w=w)
+
+
+def _position_enu(truth: Truth) -> pose_pb2.Vector3 | None:
+    if truth.position_enu is None:
+        return None
+    east, north, up = truth.position_enu
+    return pose_pb2.Vector3(x=east, y=north, z=up)

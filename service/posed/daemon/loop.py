@@ -80,7 +80,7 @@ class _Daemon:
         self._sensors = SensorServiceStub(self._service, clock, statistics, lambda: self._server.parcels_refused)
         services: dict[str, Stub] = {
             "sensorservice": self._sensors,
-            "poseservice": PoseServiceStub(self._service, config.filter),
+            "poseservice": PoseServiceStub(self._service, config.filter, profile),
         }
         self._manager = ServiceManagerStub(services, self._server.peers, self._lifecycle, clock, self._boot_id, config)
         for name, stub in {"servicemanager": self._manager, **services}.items():

@@ -8,6 +8,7 @@ from posed.binder.stub import Caller, Stub
 from posed.daemon import encoding
 from posed.errors import InvalidArgumentError
 from posed.events import RateMode
+from posed.hal.profile import DeviceProfile
 from posed.proto import binder_pb2, pose_pb2
 from posed.sensors import SensorService
 
@@ -17,9 +18,14 @@ class PoseServiceStub(Stub):
 
     descriptor = pose_pb2.DESCRIPTOR.services_by_name["IPoseService"]
 
-    def __init__(self, service: SensorService, filter_name: str) -> None:
+    def __init__(self, service: SensorService, filter_name: str, profile: DeviceProfile) -> None:
         self._service = service
         self._filter_name = filter_name
+        self._device = pose_pb2.Device(
+            profile=profile.name,
+            camera_fov_deg=profile.camera_fov_deg,
+            screen_rotation_deg=profile.screen_rotation_deg,
+        )
         self._listeners: dict[tuple[Peer, str], Proxy] = {}
         self._watched: set[Peer] = set()
 
@@ -38,6 +44,7 @@ class PoseServiceStub(Stub):
             pose_topic=encoding.pose_topic(request.pose_period_us),
             truth_topic=encoding.truth_topic(request.pose_period_us),
             configuration=self._configuration(),
+            device=self._device,
         )
 
     def unregisterPose(self, request: pose_pb2.UnregisterPoseRequest, caller: Caller) -> binder_pb2.Empty:

@@ -75,6 +75,7 @@ class PosePublisher:
     def _publish_truth(self, topic: bytes, pose: Pose) -> None:
         try:
             truth = self._source.truth(pose.orientation.timestamp_ns)
+            at_instant = self._source.truth(pose.instant_ns)
         except PosedError as error:
             # Asked for by a subscriber that cannot be answered: say so once, go on with the poses.
             _log.warning("no truth stream: %s", error)
@@ -82,5 +83,5 @@ class PosePublisher:
             return
         if truth is not None:
             header = encoding.delivery_header(self._boot_id, pose.sequence, self._clock.now_ns(), self._source.time_map)
-            message = pose_pb2.TruthMessage(header=header, truth=encoding.truth(truth))
+            message = pose_pb2.TruthMessage(header=header, truth=encoding.truth(truth, pose.instant_ns, at_instant))
             self.socket.send(topic + message.SerializeToString())
