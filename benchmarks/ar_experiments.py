@@ -28,10 +28,10 @@ from simulation import Simulation, axes, raw_axes, simulate
 
 from posed.evaluation.measures import to_magnetic_north
 from posed.events import Float64Array, Int64Array, RateMode
-from posed.fusion import SensorNoise, make_filter
 from posed.fusion.filter import OrientationFilter
 from posed.hal.motion import make_script
 from posed.hal.profile import load_profile
+from posed.sensors import make_device_filter
 
 MODES = (RateMode.NORMAL, RateMode.UI, RateMode.GAME, RateMode.FASTEST)
 TURNS = ("turn-x", "turn-y", "turn-z")
@@ -172,8 +172,7 @@ def plot_axes(path: Path) -> None:
 
 
 def _filter() -> OrientationFilter:
-    noise = load_profile("patonis2018").noise
-    return make_filter("dcm", SensorNoise(noise.gyroscope_density, noise.accelerometer_std, noise.magnetic_field_std))
+    return make_device_filter("dcm", load_profile("patonis2018"))
 
 
 Axes = tuple[Float64Array, Float64Array, Float64Array]

@@ -92,14 +92,14 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
     from posed.daemon.statistics import PublicationStatistics
     from posed.daemon.waiting import Waiter
     from posed.events import SensorType
-    from posed.fusion import SensorNoise, make_filter
     from posed.hal import open_source
     from posed.hal.profile import load_profile
-    from posed.sensors import SensorService
+    from posed.sensors import SensorService, make_device_filter
 
     clock = BootClock()
-    source = open_source(f"replay:{recording}", load_profile("patonis2018"), clock, loop=True)
-    service = SensorService(source, make_filter("dcm", SensorNoise()), clock)
+    profile = load_profile("patonis2018")
+    source = open_source(f"replay:{recording}", profile, clock, loop=True)
+    service = SensorService(source, make_device_filter("dcm", profile), clock)
     statistics = PublicationStatistics()
     publisher = PosePublisher(pose_path(directory), context(), bytes(16), clock, source, statistics)
     service.register_pose("loop", 100_000, 0)

@@ -70,7 +70,7 @@ def times(batch: EventBatch, handle: int) -> list[int]:
 
 def assert_same(found: EventColumn, expected: EventColumn) -> None:
     np.testing.assert_array_equal(found.timestamp_ns, expected.timestamp_ns)
-    np.testing.assert_array_equal(found.values, expected.values)
+    np.testing.assert_allclose(found.values, expected.values, rtol=1e-13, atol=1e-13)
     np.testing.assert_array_equal(found.accuracy, expected.accuracy)
 
 
@@ -151,6 +151,31 @@ def test_a_rate_change_takes_effect_from_the_last_drained_instant() -> None:
     assert_same(source.drain(LAST).columns[GYRO], fast[51:])
 
 
+@settings(max_examples=50, deadline=None)
+@given(
+    changes=st.lists(
+        st.tuples(st.integers(1, 700 * MS), st.sampled_from([0, 20 * MS, 66_667_000, 200 * MS])),
+        min_size=1,
+        max_size=6,
+    ),
+)
+def test_no_rotation_is_lost_or_told_twice_when_the_rate_changes(changes: list[tuple[int, int]]) -> None:
+    source, _ = a_source(profile=TABLET, on=(GYRO,))
+    now_ns, found = FIRST, []
+    for wait_ns, period_ns in [*changes, (LAST - FIRST, 0)]:
+        now_ns += wait_ns
+        found.append(source.drain(now_ns).columns.get(GYRO))
+        source.batch(GYRO, period_ns, 0)
+    column = EventColumn.concatenate([each for each in found if each is not None])
+    told = np.diff(column.timestamp_ns) @ column.values[1:]
+    recorded = RECORDING.columns[SensorType.GYROSCOPE]
+    share = np.diff(recorded.timestamp_ns, prepend=FIRST)[:, np.newaxis] * recorded.values
+    ends = column.timestamp_ns[[0, -1]]
+    for axis, angle in enumerate(np.cumsum(share, axis=0).T):
+        turned = np.diff(np.interp(ends, recorded.timestamp_ns, angle))
+        assert told[axis] == pytest.approx(turned[0], rel=1e-9, abs=1.0)
+
+
 def test_the_first_sample_of_all_stands_at_the_first_activation() -> None:
     source, clock = a_source()
     clock.advance_to(BOOT + 77)
@@ -190,6 +215,16 @@ def test_a_pause_of_a_replay_drained_ahead_of_the_clock_loses_nothing() -> None:
     before = times(source.drain(FIRST + 900 * MS), GYRO)
     source.activate(GYRO, False)
     source.activate(GYRO, True)
+    recorded = RECORDING.columns[SensorType.GYROSCOPE].timestamp_ns.tolist()
+    assert before + times(source.drain(LAST), GYRO) == recorded
+
+
+def test_a_replay_resumed_after_a_suspend_goes_on_where_it_was() -> None:
+    source, clock = a_source(speed=2.0, on=(GYRO,))
+    before = times(source.drain(FIRST + 900 * MS), GYRO)
+    clock.advance_to(BOOT + 3_600_000 * MS)
+    source.resume()
+    assert source.time_map.to_boot(FIRST + 900 * MS) == pytest.approx(clock.now_ns(), abs=1)
     recorded = RECORDING.columns[SensorType.GYROSCOPE].timestamp_ns.tolist()
     assert before + times(source.drain(LAST), GYRO) == recorded
 

@@ -161,6 +161,29 @@ class TestSource:
             START + k * SECOND // 5 for k in (11, 12, 13, 14, 15)
         ]
 
+    def test_no_rotation_is_lost_or_told_twice_when_the_rate_changes(self) -> None:
+        source, _ = phone(ideal(), "pan", handles=(GYROSCOPE,))
+        found = []
+        for at_s, period_us in ((3.013, 200_000), (3.4, 0), (4.031, 66_667), (4.033, 20_000), (6.13, 0), (7.0, 0)):
+            found.append(source.drain(START + round(at_s * SECOND)).columns.get(GYROSCOPE))
+            source.batch(GYROSCOPE, period_us * 1000, 0)
+        column = EventColumn.concatenate([each for each in found if each is not None])
+        first, last = int(column.timestamp_ns[0]), int(column.timestamp_ns[-1])
+        turns = rotation.from_rotation_vector(column.values[1:] * np.diff(column.timestamp_ns)[:, np.newaxis] / 1e9)
+        attitude = np.array([source.truth(first).quaternion])
+        for turn in turns:
+            attitude = rotation.multiply(attitude, turn[np.newaxis])
+        assert abs(float(attitude[0] @ source.truth(last).quaternion)) == pytest.approx(1.0, abs=1e-10)
+
+    def test_what_a_suspend_missed_is_left_out(self) -> None:
+        source, clock = phone(handles=(GYROSCOPE,))
+        source.drain(START + SECOND)
+        clock.advance_to(START + 3600 * SECOND)
+        source.resume()
+        stamps = source.drain(START + 3601 * SECOND).columns[GYROSCOPE].timestamp_ns
+        assert len(stamps) == pytest.approx(200, abs=1)
+        assert stamps[0] > START + 3600 * SECOND
+
     def test_batch_to_the_same_rate_leaves_the_stream_alone(self) -> None:
         source, _ = phone(handles=(GYROSCOPE,))
         before = drained(source, 1, GYROSCOPE).timestamp_ns[-1]

@@ -42,6 +42,7 @@ class RegularSource:
             for kind in types
         )
         self.time_map = TimeMap(offset_ns=1_000_000_000)
+        self.clock = VirtualClock(self.time_map.offset_ns)
         self.end_ns: int | None = None
         self.calls: list[tuple[Any, ...]] = []
         self._period_ns = {sensor.handle: 200_000_000 for sensor in self.sensors}
@@ -77,6 +78,11 @@ class RegularSource:
             self._done_ns[handle] = until_ns
         flushes, self._flushes = self._flushes, []
         return EventBatch(columns, flushes)
+
+    def resume(self) -> None:
+        self.calls.append(("resume",))
+        self._now_ns = self.time_map.to_sample(self.clock.now_ns())
+        self._done_ns = dict.fromkeys(self._done_ns, self._now_ns)
 
     def next_sample_ns(self, handle: int) -> int | None:
         if handle not in self._done_ns:
@@ -123,7 +129,7 @@ class Bench:
 
     def __init__(self, types: tuple[SensorType, ...], fifo: int = 10_000) -> None:
         self.source = RegularSource(types, fifo)
-        self.clock = VirtualClock(self.source.time_map.offset_ns)
+        self.clock = self.source.clock
         self.filter = CountingFilter()
         self.service = SensorService(self.source, self.filter, self.clock)
 

@@ -62,3 +62,39 @@ def test_a_flush_complete_outlives_the_events_dropped_around_it() -> None:
     first, second = connection.take(100), connection.take(100)
     assert (first.columns, first.flush_completes) == ({}, (1,))
     assert second.columns[4].timestamp_ns.tolist() == [5, 6]
+
+
+def _interleaved(connection: SensorEventConnection, count: int) -> None:
+    for handle, first in ((1, 0), (4, 1)):
+        times = np.arange(first, 2 * count, 2, dtype=np.int64)
+        connection.append(handle, EventColumn(times, np.zeros((count, 3)), np.full(count, 3, np.int8)))
+
+
+def test_what_does_not_fit_one_message_stays_in_order_over_all_sensors() -> None:
+    connection = SensorEventConnection(10_000)
+    _interleaved(connection, 1500)
+    newest = -1
+    while connection:
+        columns = connection.take(1000).columns.values()
+        assert sum(map(len, columns)) == 1000
+        assert min(int(column.timestamp_ns[0]) for column in columns) > newest
+        newest = max(int(column.timestamp_ns[-1]) for column in columns)
+    assert newest == 2999
+
+
+def test_the_oldest_of_all_sensors_are_dropped() -> None:
+    connection = SensorEventConnection(10)
+    _interleaved(connection, 8)
+    assert connection.events_dropped == 6
+    taken = connection.take(100).columns
+    assert [taken[handle].timestamp_ns.tolist() for handle in (1, 4)] == [[6, 8, 10, 12, 14], [7, 9, 11, 13, 15]]
+
+
+def test_a_flush_complete_waits_for_the_events_before_it() -> None:
+    connection = SensorEventConnection(100)
+    connection.append(1, _column(0, 5))
+    connection.append_flush_complete(1)
+    assert connection.take(3).flush_completes == ()
+    assert connection.flush_completes == 1
+    assert connection.take(3).flush_completes == (1,)
+    assert connection.flush_completes == 0

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from posed.errors import InvalidArgumentError, InvalidStateError
 from posed.events import FilterStatus, RateMode, SensorType
 from posed.sensors import SensorEventConnection
+from posed.sensors.connection import MAX_FLUSH_COMPLETES
 
 ACC, MAG, GYRO = 1, 2, 4
 MakeBench = Callable[..., Any]
@@ -157,6 +158,43 @@ def test_a_flush_without_a_sensor_is_an_error(make_bench: MakeBench) -> None:
     bench = make_bench()
     with pytest.raises(InvalidStateError, match="nothing to flush"):
         bench.service.flush(bench.service.connect())
+
+
+def test_flush_completes_that_nobody_reads_are_bounded(make_bench: MakeBench) -> None:
+    bench = make_bench()
+    listener = bench.service.connect()
+    bench.service.enable(listener, ACC, 20_000, 0)
+    for _ in range(MAX_FLUSH_COMPLETES):
+        bench.service.flush(listener)
+    with pytest.raises(InvalidStateError, match="1000 flush-completes already wait"):
+        bench.service.flush(listener)
+    assert len(listener.take(1000).flush_completes) == MAX_FLUSH_COMPLETES
+    bench.service.flush(listener)
+
+
+def test_one_that_leaves_does_not_put_off_what_waits_for_its_latency(make_bench: MakeBench) -> None:
+    bench = make_bench()
+    staying, leaving = bench.service.connect(), bench.service.connect()
+    bench.service.enable(staying, ACC, 20_000, 1_000_000)
+    bench.service.enable(leaving, ACC, 10_000, 1_000_000)
+    bench.advance_ms(900)
+    bench.service.disable(leaving, ACC)
+    assert bench.deadline_ms == 1000
+
+
+def test_after_a_suspend_the_present_comes_first(make_bench: MakeBench) -> None:
+    bench = make_bench()
+    bench.service.register_pose("client", 100_000, 20_000)
+    bench.advance_ms(1000)
+    bench.service.take_poses()
+    assert bench.deadline_ms is not None
+    hour_ms = 3_600_000
+    bench.advance_ms(hour_ms)
+    assert ("resume",) in bench.source.calls
+    assert len(bench.service.take_poses()) <= 2
+    assert len(bench.filter.fed) < 500
+    bench.advance_ms(hour_ms + 1000)
+    assert [pose.sequence for pose in bench.service.take_poses()] == list(range(36_000, 36_010))
 
 
 def test_a_listener_that_left_does_not_take_anothers_flush(make_bench: MakeBench) -> None:

@@ -24,12 +24,10 @@ from posed.daemon.publisher import PosePublisher
 from posed.daemon.sensor_stub import SensorServiceStub
 from posed.daemon.statistics import PublicationStatistics
 from posed.daemon.waiting import Waiter
-from posed.fusion import make_filter
-from posed.fusion.filter import SensorNoise
 from posed.hal import open_source
 from posed.hal.profile import load_profile
 from posed.proto import events_pb2
-from posed.sensors import SensorService
+from posed.sensors import SensorService, make_device_filter
 
 _log = logging.getLogger(__name__)
 
@@ -66,10 +64,7 @@ class _Daemon:
         self._source = open_source(
             config.source, profile, clock, seed=config.seed, speed=config.speed, loop=config.loop
         )
-        noise = profile.noise
-        orientation_filter = make_filter(
-            config.filter, SensorNoise(noise.gyroscope_density, noise.accelerometer_std, noise.magnetic_field_std)
-        )
+        orientation_filter = make_device_filter(config.filter, profile)
         self._service = SensorService(self._source, orientation_filter, clock, config.position)
         self._context = context()
         self._server = Server(control_path(directory), self._context)

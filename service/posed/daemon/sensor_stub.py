@@ -1,5 +1,6 @@
 """The object "sensorservice": listeners of sensor events, and the statistics."""
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -9,9 +10,11 @@ from posed.binder.stub import Caller, Stub
 from posed.clock import Clock
 from posed.daemon import encoding
 from posed.daemon.statistics import PublicationStatistics, process_cpu_ns, voluntary_switches
-from posed.errors import InvalidArgumentError, InvalidStateError
+from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
 from posed.proto import binder_pb2, events_pb2, sensors_pb2
 from posed.sensors import SensorEventConnection, SensorService
+
+_log = logging.getLogger(__name__)
 
 # Keeps a message of the widest events (6 values) below 64 KiB: 1000 * (8 + 6 * 4 + 1) bytes.
 _EVENTS_A_MESSAGE = 1000
@@ -60,7 +63,14 @@ class SensorServiceStub(Stub):
                     listener.unsent = encoding.sensor_events(
                         header(listener.messages), chunk, listener.connection.events_dropped
                     )
-                if not listener.proxy.onSensorEvents(listener.unsent):
+                try:
+                    sent = listener.proxy.onSensorEvents(listener.unsent)
+                except PosedError:
+                    # Whatever one listener's message fails of, the other listeners are not to suffer from it.
+                    _log.exception("a message to listener %r of process %d is lost", listener.name, listener.peer.pid)
+                    listener.unsent = None
+                    continue
+                if not sent:
                     break
                 listener.events_sent += sum(len(column.timestamp_ns) for column in listener.unsent.columns)
                 listener.unsent = None

@@ -4,12 +4,10 @@ from collections.abc import Iterator
 
 from posed.clock import VirtualClock
 from posed.events import Pose
-from posed.fusion import make_filter
-from posed.fusion.filter import SensorNoise
 from posed.hal.profile import DeviceProfile
 from posed.hal.recording import Recording
 from posed.hal.replay import ReplaySource
-from posed.sensors import SensorService
+from posed.sensors import SensorService, make_device_filter
 
 
 def fuse_recording(
@@ -30,11 +28,7 @@ def fuse_recording(
     """
     clock = VirtualClock()
     source = ReplaySource(recording, profile, clock)
-    noise = profile.noise
-    orientation_filter = make_filter(
-        filter_name, SensorNoise(noise.gyroscope_density, noise.accelerometer_std, noise.magnetic_field_std)
-    )
-    service = SensorService(source, orientation_filter, clock)
+    service = SensorService(source, make_device_filter(filter_name, profile), clock)
     # The replay begins here: its first sample stands at the clock's 0.
     service.register_pose("fuse", pose_period_us, sampling_period_us)
     end_ns = recording.end_ns - recording.start_ns

@@ -13,7 +13,7 @@ from posed.hal.attitude_trial import load_trial
 from posed.hal.csv_recording import load_csv
 from posed.hal.profile import UNCALIBRATED_TYPE, DeviceProfile, SensorProfile
 from posed.hal.recording import Recording, read_only
-from posed.hal.thinning import LONGEST_HOLD_NS, thin_by_mean, thin_by_nearest
+from posed.hal.thinning import LONGEST_HOLD_NS, mean_between, thin_by_mean, thin_by_nearest
 
 SLOWEST_SPEED = 0.1
 FASTEST_SPEED = 50.0
@@ -119,7 +119,7 @@ class ReplaySource:
                 self._untouched = set(self._streams)
             # Sensors switched on one after another, before anything was drained, all begin where the run began:
             # what a replay yields then does not depend on how fast its user was.
-            stream.since_ns = self._drained_ns if handle in self._untouched else self._present_ns()
+            stream.begin(self._drained_ns if handle in self._untouched else self._present_ns())
             self._active[handle] = stream
             return
         self._untouched.discard(handle)
@@ -154,6 +154,11 @@ class ReplaySource:
             self._drained_ns = until_ns
             self._untouched.clear()
         return EventBatch(columns, flushed)
+
+    def resume(self) -> None:
+        """Go on with the sample behind the last drain, which stands at the clock's now."""
+        if self._active:
+            self._time_map = self._standing_at(self._drained_ns + 1)
 
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if the sensor is off or the replay at its end.
@@ -226,23 +231,50 @@ class _Stream:
         self._rate_hz = 0.0
         self.since_ns = anchor_ns - 1
         """Samples up to here are not due: the sensor was off."""
+        self._taken_ns: int | None = None
+        """Timestamp of the last row taken."""
+        self._joins_ns: int | None = None
+        """That of the last row at the rate before, until the first at this one is taken."""
         self._use(recorded)
 
     @property
     def is_configured(self) -> bool:
         return self._rate_hz > 0.0
 
+    def begin(self, since_ns: int) -> None:
+        """Yield what is later than `since_ns`."""
+        self.since_ns = since_ns
+        self._taken_ns = self._joins_ns = None
+
     def configure(self, sampling_period_ns: int) -> int:
         rate_hz = self._part.configured_rate_hz(sampling_period_ns)
         if rate_hz != self._rate_hz:
+            if self._is_gyroscope:
+                self._joins_ns = self._taken_ns if self._joins_ns is None else self._joins_ns
             self._rate_hz = rate_hz
             self._use(self._thinned(rate_hz))
         return self._part.configured_period_ns(sampling_period_ns)
 
     def rows(self, after_ns: int, until_ns: int, shift_ns: int) -> EventColumn:
         first = bisect_right(self.times, after_ns - shift_ns)
-        rows = self._column[first : bisect_right(self.times, until_ns - shift_ns, first)]
-        return EventColumn(rows.timestamp_ns + shift_ns, rows.values, rows.accuracy) if shift_ns else rows
+        last = bisect_right(self.times, until_ns - shift_ns, first)
+        rows = self._column[first:last]
+        if first == last:
+            return rows
+        if self._joins_ns is not None:
+            rows = self._joined(rows, self._joins_ns - shift_ns)
+            self._joins_ns = None
+        if shift_ns:
+            rows = EventColumn(rows.timestamp_ns + shift_ns, rows.values, rows.accuracy)
+        self._taken_ns = self.times[last - 1] + shift_ns
+        return rows
+
+    def _joined(self, rows: EventColumn, since_ns: int) -> EventColumn:
+        """Have the first row tell of all since the last one at the rate before, not of its own interval."""
+        mean = mean_between(self._recorded, since_ns, int(rows.timestamp_ns[0]))
+        if mean is None:
+            return rows
+        return EventColumn(rows.timestamp_ns, np.concatenate([mean[np.newaxis], rows.values[1:]]), rows.accuracy)
 
     def _use(self, column: EventColumn) -> None:
         self._column = read_only(column)

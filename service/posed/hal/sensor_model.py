@@ -64,16 +64,20 @@ class SensorModel:
         self._errors += 0.5 * (soft_iron + soft_iron.T)
         self._walk = _RandomWalk(part.bias_walk, self._key)
 
-    def block(self, rate_hz: float, index: int) -> tuple[Int64Array, Float64Array]:
+    def block(
+        self, rate_hz: float, index: int, joins: tuple[int, int] | None = None
+    ) -> tuple[Int64Array, Float64Array]:
         """Return block `index` of the samples at `rate_hz`: timestamps (ns script time, int64[BLOCK_SAMPLES]) and raw
         readings (float64[BLOCK_SAMPLES, 3]).
 
-        Sample k = index * BLOCK_SAMPLES + i stands at k + 1 periods, but for the timestamp's jitter.
+        Sample k = index * BLOCK_SAMPLES + i stands at k + 1 periods, but for the timestamp's jitter. joins: the first
+        row in use, and the script time (ns) since which it stands, for a gyroscope whose rate has just changed: the
+        motion since the last sample at the rate before would be lost otherwise, or told twice.
         """
         period = exact_period_ns(rate_hz)
         grid_ns = _grid_ns(period, index)
         t = 1e-9 * grid_ns.astype(np.float64)
-        truth = self._truth(t, np.diff(grid_ns))
+        truth = self._truth(t if joins is None else 1e-9 * _joined(grid_ns, *joins).astype(np.float64))
         rng = SeededRandom(*self._key, period.numerator, period.denominator, index)
         noise = rng.normal((BLOCK_SAMPLES, 4))
         reading = truth @ self._errors.T + self._bias + self._walk.at(t[1:])
@@ -83,10 +87,10 @@ class SensorModel:
         jitter = np.clip(noise[:, 3] * (1e9 * self._part.timestamp_jitter_s), -latest, latest)
         return grid_ns[1:] + np.rint(jitter).astype(np.int64), self._digitised(self._calibration.invert(reading))
 
-    def _truth(self, t: Float64Array, elapsed_ns: Int64Array) -> Float64Array:
+    def _truth(self, t: Float64Array) -> Float64Array:
         """Return what an ideal part reads at t[1:] (s; a gyroscope: on the mean since the instant before)."""
         if self._part.type is SensorType.GYROSCOPE:
-            return rotation.increments(self._script.attitude(t)) / (1e-9 * elapsed_ns)[:, np.newaxis]
+            return rotation.increments(self._script.attitude(t)) / np.diff(t)[:, np.newaxis]
         t = t[1:]
         if self._part.type is SensorType.ACCELEROMETER:
             return rotation.to_device(self._script.attitude(t), self._script.acceleration(t) + _UP_G)
@@ -111,6 +115,13 @@ def _grid_ns(period: Fraction, index: int) -> Int64Array:
     # The block's start in Python's integers: the product leaves 64 bits behind after days of an uneven rate.
     whole, rest = divmod(index * BLOCK_SAMPLES * period.numerator, period.denominator)
     return whole + (rest + period.numerator * np.arange(BLOCK_SAMPLES + 1, dtype=np.int64)) // period.denominator
+
+
+def _joined(grid_ns: Int64Array, row: int, since_ns: int) -> Int64Array:
+    """Return the instants with sample `row` standing since `since_ns`; those before it, not in use, moved along."""
+    joined = grid_ns.copy()
+    joined[: row + 1] += since_ns - grid_ns[row]
+    return joined
 
 
 class _RandomWalk:

@@ -75,7 +75,7 @@ class SimulatedPhone:
             self._rates[handle] = rate_hz
             running = self._streams.get(handle)
             if running is not None:
-                self._start(handle, max(running.after_ns, self._drained_ns))
+                self._start(handle, max(running.after_ns, self._drained_ns), running.last_ns)
         return part.configured_period_ns(sampling_period_ns)
 
     def flush(self, handle: int) -> None:
@@ -92,6 +92,12 @@ class SimulatedPhone:
             return EventBatch(columns)
         flushes, self._flushes = tuple(self._flushes), []
         return EventBatch(columns, flushes)
+
+    def resume(self) -> None:
+        """Leave out what was sampled up to the clock's now and not drained."""
+        self._drained_ns = max(self._clock.now_ns(), self._drained_ns)
+        for handle in self._streams:
+            self._start(handle, self._drained_ns)
 
     def next_sample_ns(self, handle: int) -> int | None:
         """Return the timestamp of the next sample of a sensor, None if it is not active."""
@@ -114,19 +120,22 @@ class SimulatedPhone:
             name = SensorType(handle).name.lower()
             raise InvalidArgumentError(f"sensor handle {handle} ({name}) is not active; activate it before a flush")
 
-    def _start(self, handle: int, after_ns: int) -> None:
+    def _start(self, handle: int, after_ns: int, since_ns: int | None = None) -> None:
         if self._zero_ns is None:
             self._zero_ns = after_ns
         kind = self._profile.sensor(handle).type
         calibration = self._profile.calibration[kind]
         uncalibrated = handle == UNCALIBRATED_TYPE[kind]
         self._streams[handle] = _Stream(
-            self._models[kind], calibration, uncalibrated, self._rates[handle], self._zero_ns, after_ns
+            self._models[kind], calibration, uncalibrated, self._rates[handle], self._zero_ns, after_ns, since_ns
         )
 
 
 class _Stream:
-    """An active sensor at one rate: its samples later than `after_ns`, made a block at a time, taken in slices."""
+    """An active sensor at one rate: its samples later than `after_ns`, made a block at a time, taken in slices.
+
+    since_ns: where the last sample at the rate before stands on its grid; the first one here tells of all since then.
+    """
 
     def __init__(
         self,
@@ -136,6 +145,7 @@ class _Stream:
         rate_hz: float,
         zero_ns: int,
         after_ns: int,
+        since_ns: int | None,
     ) -> None:
         self._model = model
         self._calibration = calibration
@@ -148,6 +158,20 @@ class _Stream:
         passed = int((after_ns - zero_ns) / exact_period_ns(rate_hz))
         self._load(max(passed - 1, 0) // BLOCK_SAMPLES)
         self._seek(bisect_right(self._stamps, after_ns))
+        if since_ns is not None:
+            # Jitter may have put the last sample before the change, and this one, of the same instant, behind it.
+            if self._instant_ns(self._offset + 1) <= since_ns:
+                self._seek(self._offset + 1)
+            self._load(self._index, (self._offset, since_ns - zero_ns))
+        self._since_ns = since_ns
+        self._begun = (self._index, self._offset)
+
+    @property
+    def last_ns(self) -> int | None:
+        """The instant of the last sample taken, here or at the rate before, free of jitter; None before the first."""
+        if (self._index, self._offset) == self._begun:
+            return self._since_ns
+        return self._instant_ns(self._offset)
 
     def take(self, until_ns: int) -> EventColumn:
         """Return the samples not taken yet that are not later than `until_ns`; at least one has to be due."""
@@ -156,7 +180,11 @@ class _Stream:
             end = bisect_right(self._stamps, until_ns, self._offset)
             parts.append(self._block[self._offset : end])
             self._seek(end)
-        return parts[0] if len(parts) == 1 else _joined(parts)
+        return EventColumn.concatenate(parts)
+
+    def _instant_ns(self, samples: int) -> int:
+        """Return where the last of the first `samples` samples of the block stands on the grid, free of jitter."""
+        return self._zero_ns + int((self._index * BLOCK_SAMPLES + samples) * exact_period_ns(self._rate_hz))
 
     def _seek(self, offset: int) -> None:
         if offset == BLOCK_SAMPLES:
@@ -165,8 +193,8 @@ class _Stream:
         self._offset = offset
         self.next_ns = self._stamps[offset]
 
-    def _load(self, index: int) -> None:
-        timestamp_ns, raw = self._model.block(self._rate_hz, index)
+    def _load(self, index: int, joins: tuple[int, int] | None = None) -> None:
+        timestamp_ns, raw = self._model.block(self._rate_hz, index, joins)
         timestamp_ns += self._zero_ns
         if self._uncalibrated:
             values = np.concatenate([raw, np.broadcast_to(self._calibration.bias, raw.shape)], axis=1)
@@ -180,11 +208,3 @@ class _Stream:
 _HIGH_ACCURACY = np.full(BLOCK_SAMPLES, 3, np.int8)
 """Android's SENSOR_STATUS_ACCURACY_HIGH, of every sample: a simulated part is never in doubt."""
 _HIGH_ACCURACY.flags.writeable = False
-
-
-def _joined(parts: list[EventColumn]) -> EventColumn:
-    return EventColumn(
-        np.concatenate([part.timestamp_ns for part in parts]),
-        np.concatenate([part.values for part in parts]),
-        np.concatenate([part.accuracy for part in parts]),
-    )

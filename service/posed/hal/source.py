@@ -40,6 +40,12 @@ class SensorSource(Protocol):
     def drain(self, until_ns: int) -> EventBatch:
         """Return every sample of the active sensors later than the last drain and not later than `until_ns`."""
 
+    def resume(self) -> None:
+        """Go on from the clock's now after a time in which nobody could drain: a suspend, a stopped process.
+
+        A replay continues with what comes next in it, moving its time map; any other source loses what was missed.
+        """
+
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if none is expected."""
 

@@ -54,6 +54,22 @@ def thin_by_mean(column: EventColumn, rate_hz: float, anchor_ns: int) -> EventCo
     return EventColumn(grid + anchor_ns, means, column.accuracy[seen - 1])
 
 
+def mean_between(column: EventColumn, since_ns: int, until_ns: int) -> Float64Array | None:
+    """Return the mean over `(since_ns, until_ns]` as `thin_by_mean` weights it, float64[w], None across a loss of data.
+
+    column: values float64[n, w].
+    """
+    first = max(1, int(np.searchsorted(column.timestamp_ns, since_ns, side="right")))
+    last = int(np.searchsorted(column.timestamp_ns, until_ns, side="left")) + 1
+    knots = column.timestamp_ns[first - 1 : last]
+    values = column.values[first:last]
+    if len(knots) < 2 or np.diff(knots).max() > LONGEST_HOLD_NS or not np.isfinite(values).all():
+        return None
+    share = np.diff(np.clip(knots, since_ns, until_ns)).astype(np.float64)
+    mean: Float64Array = share @ values / share.sum()
+    return mean
+
+
 def thin_by_nearest(column: EventColumn, rate_hz: float, anchor_ns: int) -> EventColumn:
     """Return, for each grid instant, the sample nearest to it, at the sample's own time.
 

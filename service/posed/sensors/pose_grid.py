@@ -17,13 +17,11 @@ class PoseGrid:
     occurred: FilterStatus = FilterStatus.OK
     """What happened in the filter since the last instant."""
 
-    @classmethod
-    def after(cls, period_us: int, anchor_ns: int, now_ns: int, events_fused: int) -> "PoseGrid":
-        """Return the grid whose next instant is the first later than `now_ns`, or the anchor itself if that is."""
-        index = max(0, (now_ns - anchor_ns) // (period_us * 1000) + 1)
-        return cls(period_us, anchor_ns, index, events_fused)
-
     @property
     def next_ns(self) -> int:
         """The next instant."""
         return self.anchor_ns + self.next_index * self.period_us * 1000
+
+    def skip(self, now_ns: int) -> None:
+        """Pass over the instants up to `now_ns`."""
+        self.next_index = max(self.next_index, (now_ns - self.anchor_ns) // (self.period_us * 1000) + 1)

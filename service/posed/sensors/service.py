@@ -1,37 +1,23 @@
 """The sensor service: registrations in, events and poses out, one drain of the source at a time."""
 
-from bisect import bisect_right
 from collections import deque
 from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
-from operator import itemgetter
+from dataclasses import dataclass, field
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError
-from posed.events import (
-    EventBatch,
-    EventColumn,
-    FilterStatus,
-    FlatEvent,
-    Pose,
-    Position,
-    RateMode,
-    SensorInfo,
-    SensorType,
-)
+from posed.events import EventColumn, Pose, Position, SensorInfo, SensorType
 from posed.fusion.filter import OrientationFilter
 from posed.hal.source import SensorSource
 from posed.sensors.arbitration import BatchParams, arbitrate, clamp_period_ns
-from posed.sensors.connection import SensorEventConnection
-from posed.sensors.pose_grid import PoseGrid
-from posed.sensors.virtual import FUSION_INPUTS, VirtualEvents, input_periods_ns, virtual_sensors
-
-MIN_POSE_PERIOD_US = 5_000
-MAX_POSE_PERIOD_US = 1_000_000
+from posed.sensors.connection import MAX_FLUSH_COMPLETES, SensorEventConnection
+from posed.sensors.pose_fusion import PoseFusion
+from posed.sensors.virtual import FUSION_INPUTS, input_periods_ns, virtual_sensors
 
 # SensorService.h: what a connection keeps where no sensor has a hardware FIFO.
 _MIN_CONNECTION_CAPACITY = 984
-_OCCURRENCES = int(FilterStatus.GAP | FilterStatus.BAD_SAMPLE)
+# A service this far behind (sample time) was suspended or stopped: to make up for hours would block it for minutes.
+_LONGEST_LAG_NS = 5_000_000_000
 
 
 @dataclass(slots=True)
@@ -60,12 +46,6 @@ class ActiveSensor:
         return latency if latency > self.params.sampling_period_ns else 0
 
 
-@dataclass(frozen=True, slots=True)
-class _PoseRequest:
-    pose_period_us: int
-    sampling_period_us: int
-
-
 class SensorService:
     """Android's SensorService over one source and one filter; the caller moves it on with `advance`.
 
@@ -80,9 +60,8 @@ class SensorService:
         position: Position | None = None,
     ) -> None:
         self._source = source
-        self._filter = orientation_filter
         self._clock = clock
-        self._position = position
+        self._fusion = PoseFusion(orientation_filter, clock, position)
         physical = source.sensors
         virtual = virtual_sensors(physical)
         self.sensors: tuple[SensorInfo, ...] = (*physical, *virtual)
@@ -90,15 +69,9 @@ class SensorService:
         self._active: list[ActiveSensor] = []
         self._inputs = {s.handle: s.type for s in physical if s.type in FUSION_INPUTS}
         self._waiting_flush: dict[int, deque[SensorEventConnection]] = {}
-        self._pose_requests: dict[Hashable, _PoseRequest] = {}
-        self._grids: dict[int, PoseGrid | None] = {}
-        self._rate_mode = RateMode.CUSTOM
-        self._anchor_ns: int | None = None
         self._now_ns = 0
-        self._poses: list[Pose] = []
-        self.events_fused = 0
+        self._due_ns: int | None = None
         self.source_cpu_ns = 0
-        self.filter_cpu_ns = 0
 
     # Registrations
 
@@ -154,9 +127,6 @@ class SensorService:
         """Undo every `enable` of a connection."""
         for handle in self._handles_of(connection):
             self.disable(connection, handle)
-        for waiting in self._waiting_flush.values():
-            while connection in waiting:
-                waiting[waiting.index(connection)] = _NOBODY
 
     def is_registered(self, connection: SensorEventConnection) -> bool:
         """Return whether the connection has any sensor."""
@@ -165,11 +135,16 @@ class SensorService:
     def flush(self, connection: SensorEventConnection) -> None:
         """Send the connection one flush-complete for each of its sensors, behind every event up to now.
 
-        Raises InvalidStateError if it has no sensor.
+        Raises InvalidStateError if it has no sensor, or too many flush-completes already wait to be read.
         """
         handles = self._handles_of(connection)
         if not handles:
             raise InvalidStateError("this listener has no sensor registered, so there is nothing to flush")
+        if connection.flush_completes + len(handles) > MAX_FLUSH_COMPLETES:
+            raise InvalidStateError(
+                f"{connection.flush_completes} flush-completes already wait for this listener (at most"
+                f" {MAX_FLUSH_COMPLETES}); read them before asking for more"
+            )
         virtual = [handle for handle in handles if self._table[handle].is_virtual]
         for handle in handles:
             if handle not in virtual:
@@ -185,31 +160,38 @@ class SensorService:
 
         Raises InvalidArgumentError if the source cannot carry a pose or a period is out of range.
         """
-        if not MIN_POSE_PERIOD_US <= pose_period_us <= MAX_POSE_PERIOD_US:
-            raise InvalidArgumentError(
-                f"pose period {pose_period_us} us is outside {MIN_POSE_PERIOD_US} to {MAX_POSE_PERIOD_US} us"
-                " (200 to 1 Hz)"
-            )
-        if sampling_period_us < 0:
-            raise InvalidArgumentError(f"sampling period {sampling_period_us} us must not be negative")
         if len(self._inputs) < len(FUSION_INPUTS):
             missing = ", ".join(kind.string_type for kind in FUSION_INPUTS if kind not in self._inputs.values())
             raise InvalidArgumentError(f"no pose from this source: it has no {missing}")
         self.advance()
-        self._pose_requests[key] = _PoseRequest(pose_period_us, sampling_period_us)
-        self._apply_pose_requests()
+        self._fusion.request(key, pose_period_us, sampling_period_us, self._sample_now_ns())
+        self._follow_pose_requests()
 
     def unregister_pose(self, key: Hashable) -> None:
         """Undo `register_pose`; an unknown key is left alone."""
-        if key in self._pose_requests:
-            self.advance()
-            del self._pose_requests[key]
-            self._apply_pose_requests()
+        self.advance()
+        self._fusion.withdraw(key, self._sample_now_ns())
+        self._follow_pose_requests()
 
     @property
     def pose_sampling_period_us(self) -> int | None:
         """The fastest sampling period that any pose registration asks for, us; None without any."""
-        return min((request.sampling_period_us for request in self._pose_requests.values()), default=None)
+        return self._fusion.sampling_period_us
+
+    @property
+    def events_fused(self) -> int:
+        """Events that have reached the filter."""
+        return self._fusion.events_fused
+
+    @property
+    def filter_cpu_ns(self) -> int:
+        """CPU time spent in the filter."""
+        return self._fusion.cpu_ns
+
+    @property
+    def ended(self) -> bool:
+        """True if the source has given its last sample."""
+        return self._source.end_ns is not None and self._now_ns >= self._source.end_ns
 
     @property
     def active_sensors(self) -> tuple[ActiveSensor, ...]:
@@ -221,33 +203,50 @@ class SensorService:
     def next_deadline_ns(self) -> int | None:
         """Return the CLOCK_BOOTTIME instant (ns) by which `advance` must run next, None if nothing is due."""
         end_ns = self._source.end_ns
-        due: list[int] = []
-        for grid in self._grids.values():
-            if grid is not None:
-                due += [grid.next_ns] if end_ns is None or grid.next_ns <= end_ns else []
-            else:
-                due += [t for t in map(self._source.next_sample_ns, self._inputs) if t is not None]
+        due = [t for t in self._fusion.next_instants_ns() if end_ns is None or t <= end_ns]
+        if self._fusion.awaits_first_sample:
+            due += [t for t in map(self._source.next_sample_ns, self._inputs) if t is not None]
         for sensor in self._active:
             latency_ns = sensor.latency_ns
             if latency_ns is None:
                 continue
             if latency_ns:
-                due += [sensor.release_ns] if sensor.pending or not self._ended else []
+                due += [sensor.release_ns] if sensor.pending or not self.ended else []
             elif not sensor.is_virtual:
                 next_ns = self._source.next_sample_ns(sensor.info.handle)
                 if next_ns is not None:
                     due.append(next_ns)
-        return self._source.time_map.to_boot(min(due)) if due else None
+        self._due_ns = min(due, default=None)
+        return None if self._due_ns is None else self._source.time_map.to_boot(self._due_ns)
 
     def advance(self) -> None:
         """Bring everything up to the clock: drain the source, fuse, fill the connections and the poses."""
         if not self._active:
             return
-        self._now_ns = self._sample_now_ns()
+        now_ns = self._sample_now_ns()
+        if self._due_ns is not None and now_ns - self._due_ns > _LONGEST_LAG_NS:
+            self._advance_to(self._due_ns)
+            self._source.resume()
+            now_ns = self._sample_now_ns()
+            self._fusion.skip(now_ns)
+        self._due_ns = None
+        self._advance_to(now_ns)
+
+    def take_poses(self) -> list[Pose]:
+        """Remove and return the poses of the grid instants passed since the last call, oldest first."""
+        return self._fusion.take_poses()
+
+    # Private
+
+    def _advance_to(self, now_ns: int) -> None:
+        self._now_ns = now_ns
         started = self._clock.cpu_ns()
-        batch = self._source.drain(self._now_ns)
+        batch = self._source.drain(now_ns)
         self.source_cpu_ns += self._clock.cpu_ns() - started
-        virtual = self._fuse(batch)
+        # A recording that has ended moves no pose on: its last sample is the last thing known.
+        until_ns = now_ns if self._source.end_ns is None else min(now_ns, self._source.end_ns)
+        wants_virtual = any(sensor.is_virtual for sensor in self._active)
+        virtual = self._fusion.fuse(batch.flat(self._inputs), until_ns, wants_virtual)
         for handle, column in (*batch.columns.items(), *virtual.items()):
             sensor = self._table[handle]
             sensor.events += len(column)
@@ -259,17 +258,6 @@ class SensorService:
             self._release(self._table[handle])
         for handle in batch.flush_completes:
             self._waiting_flush[handle].popleft().append_flush_complete(handle)
-
-    def take_poses(self) -> list[Pose]:
-        """Remove and return the poses of the grid instants passed since the last call, oldest first."""
-        poses, self._poses = self._poses, []
-        return poses
-
-    # Private
-
-    @property
-    def _ended(self) -> bool:
-        return self._source.end_ns is not None and self._now_ns >= self._source.end_ns
 
     def _sample_now_ns(self) -> int:
         return self._source.time_map.to_sample(self._clock.now_ns())
@@ -315,94 +303,17 @@ class SensorService:
             sensor.pending.clear()
             sensor.pending_events = 0
         else:
-            sensor.release_ns = self._sample_now_ns() + (sensor.latency_ns or 0)
+            release_ns = self._sample_now_ns() + (sensor.latency_ns or 0)
+            sensor.release_ns = min(sensor.release_ns, release_ns) if sensor.pending else release_ns
 
-    def _apply_pose_requests(self) -> None:
-        sampling_us = self.pose_sampling_period_us
-        if sampling_us is not None:
-            self._rate_mode = RateMode.of_period(sampling_us)
+    def _follow_pose_requests(self) -> None:
+        sampling_us = self._fusion.sampling_period_us
         for handle in self._inputs:
             sensor = self._table[handle]
             if sampling_us is None:
                 self._withdraw(sensor, _POSE)
             else:
                 self._request(sensor, _POSE, BatchParams(clamp_period_ns(sampling_us, sensor.info), None))
-        periods = {request.pose_period_us for request in self._pose_requests.values()}
-        self._grids = {period: self._grids.get(period) or self._grid(period) for period in sorted(periods)}
-
-    def _grid(self, period_us: int) -> PoseGrid | None:
-        if self._anchor_ns is None:
-            return None
-        return PoseGrid.after(period_us, self._anchor_ns, self._sample_now_ns(), self.events_fused)
-
-    def _fuse(self, batch: EventBatch) -> dict[int, EventColumn]:
-        """Feed the filter, stopping at every grid instant for a pose and at accelerometer events for fused events."""
-        wants_virtual = any(sensor.is_virtual for sensor in self._active)
-        if not self._grids and not wants_virtual:
-            return {}
-        flat = batch.flat(self._inputs)
-        if len(flat) and self._anchor_ns is None:
-            self._anchor_ns = flat[0][1]
-            self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
-        started = self._clock.cpu_ns()
-        done = 0
-        virtual = VirtualEvents()
-        for instant_ns, row, grid in self._stops(flat, wants_virtual):
-            stop = bisect_right(flat, instant_ns, done, key=_time_of)
-            self._feed(flat[done:stop])
-            done = stop
-            if grid is not None:
-                self._pass_instant(grid)
-            elif (orientation := self._filter.orientation()) is not None:
-                virtual.add(instant_ns, flat[row][2:], orientation)
-        self._feed(flat[done:])
-        self.filter_cpu_ns += self._clock.cpu_ns() - started
-        return virtual.columns()
-
-    def _stops(self, flat: list[FlatEvent], wants_virtual: bool) -> list[tuple[int, int, PoseGrid | None]]:
-        """Return (instant, row, grid) in time order: poses due (with a grid) and accelerometer events (without)."""
-        # A recording that has ended moves no grid on: its last sample is the last thing known.
-        end_ns = self._now_ns if self._source.end_ns is None else min(self._now_ns, self._source.end_ns)
-        stops: list[tuple[int, int, PoseGrid | None]] = []
-        for grid in self._grids.values():
-            if grid is not None:
-                step_ns = grid.period_us * 1000
-                stops += [(instant_ns, -1, grid) for instant_ns in range(grid.next_ns, end_ns + 1, step_ns)]
-        if wants_virtual:
-            stops += [(event[1], row, None) for row, event in enumerate(flat) if event[0] == SensorType.ACCELEROMETER]
-        stops.sort(key=_instant_of)
-        return stops
-
-    def _feed(self, events: list[FlatEvent]) -> None:
-        if events:
-            self._filter.update_batch(events)
-            self.events_fused += len(events)
-
-    def _pass_instant(self, grid: PoseGrid) -> None:
-        orientation = self._filter.orientation()
-        if orientation is not None:
-            if int(orientation.status) & _OCCURRENCES:
-                self._filter.clear_events()
-                for each in self._grids.values():
-                    if each is not None:
-                        each.occurred |= orientation.status & _OCCURRENCES
-            if grid.occurred:
-                orientation = replace(orientation, status=orientation.status | grid.occurred)
-            self._poses.append(
-                Pose(
-                    sequence=grid.next_index,
-                    instant_ns=grid.next_ns,
-                    period_us=grid.period_us,
-                    orientation=orientation,
-                    filter_name=self._filter.name,
-                    rate_mode=self._rate_mode,
-                    events_fused=self.events_fused - grid.events_before,
-                    position=self._position,
-                )
-            )
-        grid.occurred = FilterStatus.OK
-        grid.events_before = self.events_fused
-        grid.next_index += 1
 
     def _release_due(self) -> None:
         """Let go what streams; once one batched sensor is due or full, let all batched ones go, as one FIFO does."""
@@ -412,7 +323,7 @@ class SensorService:
                 self._release(sensor)
             elif sensor.latency_ns:
                 batched.append(sensor)
-        if self._ended or any(
+        if self.ended or any(
             s.release_ns <= self._now_ns or s.pending_events >= s.info.fifo_max_event_count for s in batched
         ):
             for sensor in batched:
@@ -428,7 +339,4 @@ class SensorService:
             sensor.pending_events = 0
 
 
-_instant_of = itemgetter(0)
-_time_of = itemgetter(1)
 _POSE = "pose"
-_NOBODY = SensorEventConnection(0)
