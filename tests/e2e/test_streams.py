@@ -119,8 +119,8 @@ def test_pose_rates_have_streams_of_their_own(desk: Any) -> None:
         assert [b.sequence - a.sequence for a, b in itertools.pairwise(slow)] == [1] * 9
         assert sum(pose.missed for pose in fast) <= 5
         hundred.set_pose_rate(20)
-        after = [hundred.next_pose(timeout_s=5) for _ in range(60)]
-        assert after[-1].sequence < fast[-1].sequence
+        after = hundred.next_pose(timeout_s=5)
+        assert after.sequence < fast[-1].sequence
     with pytest.raises(InvalidArgumentError, match="201 Hz"):
         PoseClient(pose_rate_hz=201)
 

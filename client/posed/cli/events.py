@@ -1,6 +1,7 @@
 """`posed events`: one sensor's raw events as they come."""
 
 import argparse
+import contextlib
 import json
 import queue
 import select
@@ -16,6 +17,8 @@ from posed.errors import InvalidArgumentError, PosedError
 # How often it is looked whether the reader is still there, while no event comes.
 _TICK_S = 0.25
 _SHORTEST_US = 1000
+# A minute at the highest rate.
+_BACKLOG = 60_000
 _ACCURACIES = {-1: "no contact", 0: "unreliable", 1: "low", 2: "medium", 3: "high"}
 _DELAYS = dict(zip(reversed(RATE_MODES), range(4), strict=True))
 
@@ -57,6 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
             if not manager.register_listener(listener, sensor, arguments.rate, arguments.latency):
                 raise PosedError(f"the daemon refused a listener for {short_name(sensor)}; see 'posed status'")
             _print_events(listener, arguments.count, arguments.json)
+        if listener.dropped:
+            print(f"posed: {listener.dropped} events were dropped: they were not read in time", file=sys.stderr)
     except KeyboardInterrupt:
         pass
     return 0
@@ -92,11 +97,18 @@ def event_line(event: SensorEvent) -> str:
 
 
 class _Listener:
+    """Keeps what the reader of stdout is too slow for, a minute of it; then the oldest go."""
+
     def __init__(self) -> None:
-        self.events: queue.SimpleQueue[SensorEvent] = queue.SimpleQueue()
+        self.events: queue.Queue[SensorEvent] = queue.Queue(_BACKLOG)
+        self.dropped = 0
 
     def on_sensor_changed(self, event: SensorEvent) -> None:
-        self.events.put(event)
+        if self.events.full():
+            with contextlib.suppress(queue.Empty):  # read meanwhile
+                self.events.get_nowait()
+                self.dropped += 1
+        self.events.put_nowait(event)
 
 
 def _print_events(listener: _Listener, count: int | None, as_json: bool) -> None:

@@ -69,7 +69,11 @@ _DETACH = (
 def _start(directory: Path, arguments: Sequence[str]) -> None:
     """Spawn the daemon and wait for its READY=1, the message systemd would get (sd_notify(3))."""
     log_path = directory / _LOG_NAME
+    if log_path.exists():
+        # The last words of a daemon that crashed are worth keeping when a client starts the next.
+        log_path.replace(log_path.with_suffix(".log.1"))
     ready_path = directory / f"ready-{os.getpid()}.sock"
+    runtime.endpoint(ready_path)  # refuses a path that bind could only call too long
     ready_path.unlink(missing_ok=True)
     alive, held_by_daemon = os.pipe()
     with (
@@ -79,17 +83,21 @@ def _start(directory: Path, arguments: Sequence[str]) -> None:
     ):
         ready.bind(str(ready_path))
         try:
-            subprocess.run(
-                [sys.executable, "-ISc", _DETACH, "-m", "posed.cli", "serve", *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=log,
-                env={**os.environ, "NOTIFY_SOCKET": str(ready_path)},
-                cwd="/",
-                pass_fds=(held_by_daemon,),
-                check=True,
-            )
-            os.close(held_by_daemon)
+            with open(held_by_daemon, "wb", buffering=0):
+                detached = subprocess.run(
+                    [sys.executable, "-ISc", _DETACH, "-m", "posed.cli", "serve", *arguments],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=log,
+                    env={**os.environ, "NOTIFY_SOCKET": str(ready_path)},
+                    cwd="/",
+                    pass_fds=(held_by_daemon,),
+                    check=False,
+                )
+            if detached.returncode:
+                raise ServiceUnavailableError(
+                    f"{sys.executable} could not start the daemon (exit code {detached.returncode}); see {log_path}"
+                )
             _await_ready(ready, alive_pipe.fileno(), log_path)
         finally:
             ready_path.unlink(missing_ok=True)

@@ -8,6 +8,7 @@ from types import TracebackType
 
 import zmq
 
+from posed.binder.proxy import Proxy
 from posed.binder.runtime import endpoint, pose_path
 from posed.binder.sockets import Socket, sub
 from posed.binder.stub import Caller, Stub
@@ -56,6 +57,7 @@ class PoseClient:
         self._seen: tuple[bytes, int] | None = None
         self._handed_out = 0
         self._missed = 0
+        self._poses: Proxy | None = None
         self._sockets: list[Socket] = []
         self._topic = b""
         self._rate_mode: str | None = None
@@ -67,6 +69,7 @@ class PoseClient:
             on_service_disconnected=on_service_disconnected,
             on_binding_died=on_binding_died,
         )
+        self._service.start()
 
     def __enter__(self) -> "PoseClient":
         return self
@@ -124,7 +127,7 @@ class PoseClient:
         return self._latest
 
     def next_pose(self, timeout_s: float | None = None) -> Pose | None:
-        """Return the next pose; None once closed, or when `timeout_s` passes without one."""
+        """Return the next pose; None when `timeout_s` passes without one, or once closed and what had come is taken."""
         with self._arrived:
             self._arrived.wait_for(lambda: self._waiting or self.state is ServiceState.CLOSED, timeout_s)
             if not self._waiting:
@@ -158,24 +161,26 @@ class PoseClient:
 
     def bind(self, service: Service) -> None:
         """Register for poses and subscribe to their topic."""
-        self._poses, _ = service.get_service("poseservice", _POSE_SERVICE)
+        poses, _ = service.get_service("poseservice", _POSE_SERVICE)
         self.release(service)
         service.connection.remove_callback(_LISTENER)
         service.connection.add_callback(_LISTENER, _PoseListener(self._configured))
-        self._register()
+        self._register(poses)
+        self._poses = poses
 
     def unbind(self, service: Service) -> None:
         """Undo `bind` towards the daemon."""
-        self._poses.unregisterPose(pose_pb2.UnregisterPoseRequest(listener=_LISTENER), timeout_s=0.3)
+        if self._poses is not None:
+            self._poses.unregisterPose(pose_pb2.UnregisterPoseRequest(listener=_LISTENER), timeout_s=0.3)
 
     def release(self, service: Service) -> None:
         """Close the pose sockets."""
+        self._poses = None
         self._topic = b""
-        while self._sockets:
-            service.unwatch(self._sockets.pop())
+        self._close_sockets()
 
-    def _register(self) -> None:
-        registration = self._poses.registerPose(
+    def _register(self, poses: Proxy) -> None:
+        registration = poses.registerPose(
             pose_pb2.PoseRequest(
                 listener=_LISTENER,
                 pose_period_us=self._pose_period_us,
@@ -187,9 +192,12 @@ class PoseClient:
         self._device = Device(device.profile, device.camera_fov_deg, device.screen_rotation_deg)
         if registration.pose_topic == self._topic:
             return
-        self.release(self._service)
+        self._close_sockets()
         self._topic = registration.pose_topic
-        self._seen = None
+        # Sequences of another period count something else.
+        with self._arrived:
+            self._waiting.clear()
+            self._seen = None
         self._subscribe(registration.pose_topic, self._take_pose)
         if self._on_truth is not None:
             self._subscribe(registration.truth_topic, self._take_truth)
@@ -197,11 +205,20 @@ class PoseClient:
     def _register_again(self) -> None:
         if self.state is not ServiceState.CONNECTED:
             return  # the next connection registers with the new values
+
+        def register() -> None:
+            if self._poses is not None:
+                self._register(self._poses)
+
         try:
-            self._service.run(self._register)
+            self._service.run(register)
         except ServiceUnavailableError:
             if self.state is ServiceState.CONNECTED:
                 raise
+
+    def _close_sockets(self) -> None:
+        while self._sockets:
+            self._service.unwatch(self._sockets.pop())
 
     def _subscribe(self, topic: bytes, take: Callable[[bytes], None]) -> None:
         # Conflation keeps one message a socket, whatever its topic: hence a socket a topic.
@@ -211,7 +228,7 @@ class PoseClient:
         self._sockets.append(socket)
 
         def read() -> None:
-            while True:
+            while not socket.closed:
                 try:
                     frame = socket.recv(zmq.NOBLOCK)
                 except zmq.Again:

@@ -12,7 +12,7 @@ from posed.binder.status import RemoteError
 from posed.binder.stub import Caller, Stub
 from posed.client.sensor import Sensor, SensorEvent, SensorEventListener, period_of_delay_us
 from posed.client.service import Service, ServiceState, call_back
-from posed.errors import InvalidArgumentError
+from posed.errors import InvalidArgumentError, ServiceUnavailableError
 from posed.proto import binder_pb2, events_pb2, sensors_pb2
 
 _log = logging.getLogger(__name__)
@@ -56,6 +56,8 @@ class SensorManager:
         self._lock = threading.Lock()
         self._queues: dict[int, _Queue] = {}
         self._names = count(1)
+        self._callbacks: set[str] = set()
+        """Names of the callback objects of the connection, which outlive a daemon."""
         self._sensors: dict[int, Sensor] = {}
         self._service = Service(
             self,
@@ -64,6 +66,7 @@ class SensorManager:
             on_service_disconnected=on_service_disconnected,
             on_binding_died=on_binding_died,
         )
+        self._service.start()
 
     def __enter__(self) -> "SensorManager":
         return self
@@ -133,16 +136,26 @@ class SensorManager:
             if not queue.registrations:
                 del self._queues[id(listener)]
         if self.state is ServiceState.CONNECTED:
-            self._service.run(lambda: self._unregister(queue, gone))
+            try:
+                self._service.run(lambda: self._unregister(queue, gone))
+            except ServiceUnavailableError as error:
+                _log.debug("unregistered by the daemon's going: %s", error)
 
     def flush(self, listener: SensorEventListener) -> bool:
-        """Ask for on_flush_completed(sensor) once for each of the listener's sensors; False if it has none."""
+        """Ask for on_flush_completed(sensor) once for each of the listener's sensors.
+
+        Returns False if it has none or the daemon refuses. Raises ServiceUnavailableError if no daemon answers.
+        """
         if listener is None:
             raise InvalidArgumentError("flush needs a listener, not None")
         queue = self._queues.get(id(listener))
         if queue is None:
             return False
-        self._service.run(lambda: self._sensor_service.flush(sensors_pb2.FlushRequest(listener=queue.name)))
+        try:
+            self._service.run(lambda: self._sensor_service.flush(sensors_pb2.FlushRequest(listener=queue.name)))
+        except RemoteError as error:
+            _log.error("cannot flush: %s", error)
+            return False
         return True
 
     def get_statistics(self) -> sensors_pb2.Statistics:
@@ -166,10 +179,17 @@ class SensorManager:
         self._sensors = {message.handle: Sensor.of_message(message) for message in found}
         with self._lock:
             queues = list(self._queues.values())
+        for name in self._callbacks - {queue.name for queue in queues}:
+            self._remove_callback(name)
         for queue in queues:
             queue.accuracies.clear()
             for handle, registration in list(queue.registrations.items()):
-                self._enable(queue, handle, registration)
+                try:
+                    self._enable(queue, handle, registration)
+                except RemoteError as error:
+                    # The daemon that returned may have another phone: what it lacks is no reason to lose the rest.
+                    _log.error("sensor %d of %s is not registered any more: %s", handle, queue.name, error)
+                    queue.registrations.pop(handle, None)
 
     def unbind(self, service: Service) -> None:
         """Nothing to undo: the daemon frees a connection's registrations when it closes."""
@@ -185,14 +205,15 @@ class SensorManager:
             if sensor.handle in queue.registrations:
                 return False
         registration = _Registration(sampling_period_us, max_report_latency_us)
-        if not queue.registrations:
+        if queue.name not in self._callbacks:
             self._service.connection.add_callback(queue.name, _Listener(self, queue))
+            self._callbacks.add(queue.name)
         try:
             self._enable(queue, sensor.handle, registration)
         except RemoteError as error:
             _log.error("cannot register %s: %s", sensor.name, error)
             if not queue.registrations:
-                self._service.connection.remove_callback(queue.name)
+                self._remove_callback(queue.name)
             return False
         with self._lock:
             queue.registrations[sensor.handle] = registration
@@ -213,7 +234,11 @@ class SensorManager:
         for handle in handles:
             self._sensor_service.disableSensor(sensors_pb2.DisableSensorRequest(listener=queue.name, handle=handle))
         if not queue.registrations:
-            self._service.connection.remove_callback(queue.name)
+            self._remove_callback(queue.name)
+
+    def _remove_callback(self, name: str) -> None:
+        self._service.connection.remove_callback(name)
+        self._callbacks.discard(name)
 
     def _dispatch(self, queue: _Queue, batch: events_pb2.SensorEvents) -> None:
         """Call the listener for each event in time order, then for the flushes behind them."""

@@ -93,9 +93,12 @@ class Service:
         endpoint(control_path(self.directory))  # a path too long is the caller's to hear of, not the thread's
         self._wake_fd: int | None = os.eventfd(0, os.EFD_CLOEXEC | os.EFD_NONBLOCK)
         self._thread = threading.Thread(target=self._run, name="posed-client", daemon=True)
-        self._thread.start()
 
     # From any thread
+
+    def start(self) -> None:
+        """Begin: the binding may be called back from here on."""
+        self._thread.start()
 
     @property
     def state(self) -> ServiceState:
@@ -116,18 +119,22 @@ class Service:
     def run(self, action: Callable[[], _T], timeout_s: float = 2 * _CALL_TIMEOUT_S) -> _T:
         """Run `action` on the service thread, once connected, and return what it returns or raise what it raises.
 
-        Raises ServiceUnavailableError if no daemon is connected in time.
+        Raises ServiceUnavailableError if no daemon is connected in time, or it goes away or hangs meanwhile.
         """
-        if threading.current_thread() is self._thread:
-            return action()
-        self.wait_connected(timeout_s)
-        future: Future[_T] = Future()
-        self._requests.append((action, future))
-        self._wake()
         try:
-            return future.result(timeout_s)
-        except TimeoutError:
-            raise ServiceUnavailableError(f"the daemon did not answer within {timeout_s:g} s") from None
+            if threading.current_thread() is self._thread:
+                return action()
+            self.wait_connected(timeout_s)
+            future: Future[_T] = Future()
+            self._requests.append((action, future))
+            self._wake()
+            try:
+                return future.result(timeout_s)
+            except TimeoutError:
+                future.cancel()
+                raise ServiceUnavailableError(f"the daemon did not answer within {timeout_s:g} s") from None
+        except (DeadObjectError, TransactionTimeoutError) as error:
+            raise ServiceUnavailableError(str(error)) from error
 
     def close(self) -> None:
         """Unbind and stop the thread; a second call does nothing. Takes a second at most, whatever the daemon does."""
@@ -200,6 +207,10 @@ class Service:
         except PosedError as error:
             # The socket is somebody else's, or this is a forked child: nothing more can come of this binding.
             self._die(str(error))
+        except Exception as error:
+            # A fault of ours must not leave the caller waiting for ever on a thread that is no more.
+            _log.exception("the binding failed")
+            self._die(f"the client failed: {error!r}; bind again")
         finally:
             self._binding.release(self)
             self._connection.close()
@@ -234,7 +245,7 @@ class Service:
         if self._wake_fd is not None and self._wake_fd in ready:
             os.eventfd_read(self._wake_fd)
         for socket, on_readable in list(self._extra.items()):
-            if socket in ready:
+            if socket in ready and socket in self._extra:  # what came before may have closed it
                 on_readable()
 
     def _try_again(self) -> None:
@@ -258,6 +269,7 @@ class Service:
 
     def _connected(self) -> None:
         self._farewell = None
+        self._retry_at = None
         try:
             self._manager().bindService(
                 service_manager_pb2.BindRequest(auto_create=self._auto_create, connection="connection")
@@ -271,6 +283,7 @@ class Service:
             return
         except PosedError as error:
             self._binding.release(self)
+            self._leave()
             self._die(str(error))
             return
         self._set_state(ServiceState.CONNECTED, "")
@@ -296,6 +309,8 @@ class Service:
         self._started_at = time.monotonic()
         try:
             ensure_daemon()
+            # It may die before it has answered: then there is no end of a connection to tell of it.
+            self._retry_at = time.monotonic() + _RETRY_S
         except (PosedError, OSError) as error:
             self._die(str(error))
 
