@@ -15,6 +15,9 @@ import numpy.typing as npt
 Int64Array = npt.NDArray[np.int64]
 Float64Array = npt.NDArray[np.float64]
 
+STANDARD_GRAVITY = 9.80665
+"""m/s2, Android's SensorManager.STANDARD_GRAVITY."""
+
 
 class SensorType(IntEnum):
     """Android's sensor types (hardware/sensors-base.h) that posed offers."""

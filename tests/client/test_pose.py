@@ -6,6 +6,7 @@ import pytest
 
 from posed.client.pose import Delivery, Pose, PoseStatus
 from posed.client.sensor import period_of_delay_us
+from posed.events import FilterStatus
 from posed.proto import events_pb2, pose_pb2
 
 _H = math.sqrt(0.5)
@@ -15,6 +16,11 @@ _S15, _C15 = math.sin(math.radians(15)), math.cos(math.radians(15))
 def _pose(quaternion: tuple[float, float, float, float], **delivery: object) -> Pose:
     header = {"boot_id": b"b", "sequence": 7, "published_ns": 0, "offset_ns": 0, "scale": 1.0} | delivery
     return Pose(Delivery(**header), 10, quaternion, (0, 0, 0), 0.1, "dcm", PoseStatus(0), "GAME", 1, None)
+
+
+def test_the_status_bits_are_those_that_the_filters_set() -> None:
+    ours = {status.name: int(status) for status in PoseStatus}
+    assert ours == {status.name: int(status) for status in FilterStatus if status}
 
 
 @pytest.mark.parametrize(

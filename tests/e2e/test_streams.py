@@ -3,6 +3,7 @@
 import csv
 import io
 import itertools
+import json
 import math
 import threading
 from collections.abc import Callable
@@ -274,6 +275,16 @@ def test_the_poses_of_a_fast_replay_equal_those_of_fuse(desk: Any, tmp_path: Pat
     recording = _recording(tmp_path / "turn.csv", 20)
     last = _replay_and_compare(desk, recording)
     assert math.degrees(last.azimuth) % 360 == pytest.approx(-20 * 18 % 360, abs=5)
+
+
+def test_a_replay_at_its_end_says_so(desk: Any, tmp_path: Path) -> None:
+    desk.serve("--source", f"replay:{_recording(tmp_path / 'short.csv', 1)}", "--speed", "10")
+    with PoseClient(every=True) as client:
+        while client.next_pose(timeout_s=1) is not None:
+            pass
+        assert client.poses_received > 0
+    assert json.loads(desk.posed("status", "--json").stdout)["source_ended"] is True
+    assert "(at its end)" in desk.posed("status").stdout
 
 
 def test_the_poses_of_a_replayed_trial_equal_those_of_fuse(desk: Any, data_dir: Path) -> None:

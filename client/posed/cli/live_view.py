@@ -10,13 +10,13 @@ from rich.text import Text
 
 from posed.cli.pose_text import bearing_deg, status_words, wind
 from posed.client import Pose, PoseStatus, Position, ServiceState
+from posed.client.pose_client import STALE_AFTER_NS
 
 MAX_WIDTH = 80
 # What stands left of a gauge, and the frame.
 _BESIDE_GAUGE = 31
 _TAPE_DEG_A_CELL = 4
 _RATE_WINDOW_NS = 3_000_000_000
-_STALE_NS = 500_000_000
 _GOOD, _DOUBTFUL, _BAD = "green", "yellow", "red"
 
 
@@ -60,7 +60,7 @@ class LiveView:
         headline = Text(news, style=f"bold {color}", overflow="fold")
         parts: list[RenderableType] = [headline]
         if pose is not None:
-            live = state is ServiceState.CONNECTED and now_ns - pose.delivery.published_ns <= _STALE_NS
+            live = state is ServiceState.CONNECTED and now_ns - pose.delivery.published_ns <= STALE_AFTER_NS
             parts += [
                 Text(),
                 _attitude(pose, live, max(1, width - _BESIDE_GAUGE)),
@@ -82,7 +82,7 @@ class LiveView:
             if self._pose is None:
                 return _DOUBTFUL, "connected; waiting for the first pose"
             silent_ns = now_ns - self._pose.delivery.published_ns
-            if silent_ns > _STALE_NS:
+            if silent_ns > STALE_AFTER_NS:
                 return _DOUBTFUL, f"connected, but no pose for {silent_ns / 1e9:.0f} s"
             if self._connections > 1:
                 return _GOOD, f"connected; the daemon has returned {_times(self._connections - 1)}"

@@ -19,7 +19,8 @@ from posed.errors import InvalidArgumentError, ServiceUnavailableError
 from posed.proto import pose_pb2
 
 _LISTENER = "pose"
-_STALE_S = 0.5
+STALE_AFTER_NS = 500_000_000
+"""Without a pose for longer, what is known is stale."""
 # What an iterator that takes every pose may fall behind before the oldest are dropped: 5 s at 200 Hz.
 _BACKLOG = 1000
 
@@ -120,7 +121,7 @@ class PoseClient:
     def stale(self) -> bool:
         """True if no pose was published within the last 0.5 s."""
         latest = self._latest
-        return latest is None or boot_time_ns() - latest.delivery.published_ns > _STALE_S * 1e9
+        return latest is None or boot_time_ns() - latest.delivery.published_ns > STALE_AFTER_NS
 
     def latest(self) -> Pose | None:
         """Return the newest pose received, None before the first."""

@@ -6,8 +6,8 @@ Kept, not computed at run time: hashlib loads OpenSSL, 3.5 MB of every process t
 HASHES = {
     "posed.IServiceManager": "f4172856b07360238841d2268929627911abf5fc781ea07e8ad22499ba5d6a4d",
     "posed.IServiceConnection": "f4172856b07360238841d2268929627911abf5fc781ea07e8ad22499ba5d6a4d",
-    "posed.ISensorService": "90ba86056c857dbfa016894f073900c87ec989c93e2e89000cafc5ad47637de3",
-    "posed.ISensorEventListener": "90ba86056c857dbfa016894f073900c87ec989c93e2e89000cafc5ad47637de3",
+    "posed.ISensorService": "6f8325bc6e6bf18eaaf3c2753bcfd7f2e6c266785cf6e76880c2052d367def33",
+    "posed.ISensorEventListener": "6f8325bc6e6bf18eaaf3c2753bcfd7f2e6c266785cf6e76880c2052d367def33",
     "posed.IPoseService": "449403c8b188cab7ff102eb1688251d3e2af9b911b72c3a69d2952e07fff12c6",
     "posed.IPoseListener": "449403c8b188cab7ff102eb1688251d3e2af9b911b72c3a69d2952e07fff12c6",
 }

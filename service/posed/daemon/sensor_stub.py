@@ -138,6 +138,7 @@ class SensorServiceStub(Stub):
                 for listener in self._listeners.values()
             ],
             parcels_refused=self._parcels_refused(),
+            source_ended=self._service.ended,
         )
 
     def _listener(self, peer: Peer, name: str) -> _Listener:

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, fields, is_dataclass
 from typing import Any, TypeVar, cast
 
 from posed.errors import InvalidArgumentError
+from posed.events import STANDARD_GRAVITY
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.filter import SensorNoise, require_positive
 from posed.fusion.gate import GateParams, GateState
@@ -38,7 +39,7 @@ class DcmParams:
     """Detection of rest and the gyroscope bias learnt there."""
     gate: GateParams = field(default_factory=GateParams)
     """The gate on magnetic disturbance."""
-    gravity: float = 9.80665
+    gravity: float = STANDARD_GRAVITY
     """m/s2, what the accelerometer reads at rest."""
 
     def __post_init__(self) -> None:

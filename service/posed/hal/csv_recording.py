@@ -33,7 +33,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from posed.errors import RecordingError
-from posed.events import EventColumn, SensorType
+from posed.events import STANDARD_GRAVITY, EventColumn, SensorType
 from posed.hal.recording import Recording, in_time_order, read_text
 
 _T = TypeVar("_T")
@@ -50,7 +50,7 @@ _SENSORS = {
     )
 }
 _UNITS: Mapping[str, Mapping[str, float]] = {
-    "accelerometer": {"m/s2": 1.0, "g": 9.80665},
+    "accelerometer": {"m/s2": 1.0, "g": STANDARD_GRAVITY},
     "magnetic_field": {"uT": 1.0, "nT": 1e-3, "mT": 1e3, "Gauss": 100.0},
     "gyroscope": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
 }

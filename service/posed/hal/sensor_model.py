@@ -6,15 +6,12 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from posed.events import Float64Array, Int64Array, SensorType
+from posed.events import STANDARD_GRAVITY, Float64Array, Int64Array, SensorType
 from posed.hal import rotation
 from posed.hal.calibration import Calibration
 from posed.hal.motion import MotionScript
 from posed.hal.profile import SensorProfile, exact_period_ns
 from posed.hal.seeded import SeededRandom
-
-STANDARD_GRAVITY = 9.80665
-"""m/s2, Android's SensorManager.STANDARD_GRAVITY."""
 
 BLOCK_SAMPLES = 256
 """Samples are made this many at a time: numpy's cost a call, not a sample, is what counts at a phone's rates."""

@@ -5,9 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from posed.events import EventColumn, Orientation, SensorInfo, SensorType
-
-STANDARD_GRAVITY = 9.80665
+from posed.events import STANDARD_GRAVITY, EventColumn, Orientation, SensorInfo, SensorType
 
 _VERSION = 3
 _ACCELEROMETER_MAX_PERIOD_NS = 50_000_000
