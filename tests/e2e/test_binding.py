@@ -1,5 +1,6 @@
 """The SDK's binding when calls come at awkward moments: from callbacks, while the daemon goes, before it is there."""
 
+import itertools
 import os
 import signal
 import threading
@@ -83,8 +84,11 @@ def test_a_change_of_the_pose_rate_counts_no_gap(desk: Any) -> None:
         assert client.next_pose(timeout_s=5) is not None
         for rate_hz in (10, 100, 20, 100):
             client.set_pose_rate(rate_hz)
-            poses = [client.next_pose(timeout_s=5) for _ in range(3)]
-            assert [pose.missed for pose in poses if pose is not None] == [0, 0, 0]
+            poses = [pose for _ in range(3) if (pose := client.next_pose(timeout_s=5)) is not None]
+            # A busy machine may make the daemon skip an instant: what is counted is to be that, and no more.
+            skipped = [later.sequence - earlier.sequence - 1 for earlier, later in itertools.pairwise(poses)]
+            assert [pose.missed for pose in poses] == [0, *skipped]
+            assert len(poses) == 3
 
 
 def test_a_client_that_is_refused_does_not_count_as_bound_and_closes(desk: Any, monkeypatch: Any) -> None:
