@@ -7,7 +7,7 @@ import pytest
 
 from posed.errors import InvalidArgumentError
 from posed.events import Float64Array
-from posed.hal import rotation
+from posed.hal import motion, rotation
 from posed.hal.motion import MotionScript, make_script, script_names
 
 NAMES = script_names()
@@ -186,3 +186,9 @@ def test_magnet_comes_and_goes() -> None:
     assert strength.max() > 20.0
     assert np.abs(np.diff(disturbance, axis=0)).max() < 1.0
     assert all(make_script(name, 1).disturbance(np.zeros(1)) is None for name in NAMES if name != "magnet")
+
+
+def test_the_walk_is_integrated_by_the_rule_of_gauss_and_legendre() -> None:
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    np.testing.assert_allclose(motion._GAUSS_NODES, nodes, rtol=1e-15)
+    np.testing.assert_allclose(motion._GAUSS_WEIGHTS, weights, rtol=1e-15)

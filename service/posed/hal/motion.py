@@ -316,7 +316,27 @@ class _Walk(_Hand):
 
 _KNOT_S = 0.1
 """The walk is integrated from knot to knot; six points over 0.1 s are exact to the last digits of a double."""
-_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(6)
+# Gauss-Legendre of order six, written out: numpy.polynomial, which knows it, takes 2 MB of the daemon's memory.
+_GAUSS_NODES = np.array(
+    [
+        -0.9324695142031519,
+        -0.6612093864662645,
+        -0.2386191860831969,
+        0.2386191860831969,
+        0.6612093864662645,
+        0.9324695142031519,
+    ]
+)
+_GAUSS_WEIGHTS = np.array(
+    [
+        0.17132449237917027,
+        0.3607615730481387,
+        0.46791393457269104,
+        0.46791393457269104,
+        0.3607615730481387,
+        0.17132449237917027,
+    ]
+)
 
 
 class _Shake(_Hand):
