@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from posed.errors import InvalidStateError, MissingExtraError
-from posed.events import STANDARD_GRAVITY, FilterStatus, FlatEvent, SensorType
+from posed.events import STANDARD_GRAVITY, FilterStatus, FlatEvent, Float64Array, SensorType
 from posed.fusion.filter import SensorNoise
 from posed.fusion.paced import PacedFilter, Periods
 
@@ -41,6 +41,16 @@ class ImufusionFilter(PacedFilter):
         self._bias: Any = None
         self._acceleration = np.zeros(3)
         self._field = np.zeros(3)
+
+    def update_synchronous(
+        self, period_s: float, rate: Float64Array, acceleration: Float64Array, field: Float64Array
+    ) -> None:
+        """Take the samples one by one, without this adapter: the package has no batch form."""
+        self._set_periods(Periods(period_s, period_s, period_s))
+        correct, update = self._bias.update, self._ahrs.update
+        samples = zip(np.degrees(rate), acceleration / STANDARD_GRAVITY, field, strict=True)
+        for rate_deg_s, acceleration_g, field_ut in samples:
+            update(correct(rate_deg_s), acceleration_g, field_ut)
 
     def save(self) -> dict[str, Any]:
         """Raise InvalidStateError: the state cannot be read."""

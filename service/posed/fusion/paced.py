@@ -14,7 +14,7 @@ from math import pi, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
-from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
+from posed.events import FilterStatus, FlatEvent, Float64Array, Orientation, SensorType
 
 _ACCELEROMETER = int(SensorType.ACCELEROMETER)
 _MAGNETIC_FIELD = int(SensorType.MAGNETIC_FIELD)
@@ -82,6 +82,15 @@ class PacedFilter(ABC):
     @abstractmethod
     def _answer(self) -> tuple[tuple[float, ...], tuple[float, ...], FilterStatus]:
         """Return the quaternion (w, x, y, z), device to ENU, the gyroscope's bias (rad/s) and the status."""
+
+    @abstractmethod
+    def update_synchronous(
+        self, period_s: float, rate: Float64Array, acceleration: Float64Array, field: Float64Array
+    ) -> None:
+        """Take samples of all three sensors at one rate, float64[n, 3], by the fastest form the package has.
+
+        For measuring what it costs: nothing that it leads to can be asked for.
+        """
 
     # The protocol
 

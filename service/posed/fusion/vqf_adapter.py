@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from posed.errors import InvalidArgumentError, MissingExtraError
-from posed.events import FilterStatus, FlatEvent, SensorType
+from posed.events import FilterStatus, FlatEvent, Float64Array, SensorType
 from posed.fusion.filter import SensorNoise
 from posed.fusion.paced import PacedFilter, Periods
 
@@ -30,6 +30,12 @@ class VqfFilter(PacedFilter):
         """Take no account of `noise`: VQF's defaults are meant for all sensors."""
         super().__init__()
         self._vqf: Any = None
+
+    def update_synchronous(
+        self, period_s: float, rate: Float64Array, acceleration: Float64Array, field: Float64Array
+    ) -> None:
+        """Take whole arrays in one call, as VQF's compiled batch form does."""
+        VQF(period_s).updateBatch(rate, acceleration, field)
 
     def save(self) -> dict[str, Any]:
         """Return the state of VQF and of what is held for it, as values that JSON can hold."""
