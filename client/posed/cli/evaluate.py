@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--calibration",
         choices=[each.value for each in CalibrationChoice],
         default=CalibrationChoice.OWN.value,
-        help="of a phone's magnetometer and gyroscope: fitted of its calibration recordings, or Android's (default: own)",
+        help="of a phone's magnetometer and gyroscope: fitted of recordings made for it, or Android's (default: own)",
     )
     parser.add_argument(
         "--jobs", type=positive_count, metavar="N", help="trials at a time, each a process (default: one a core)"
