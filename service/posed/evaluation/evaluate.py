@@ -118,8 +118,8 @@ def evaluate_trial(trial: Trial, plan: Plan) -> tuple[Result, ...]:
                 answers = run_filter(_maker(name)(), events)
                 ns_per_event = cpu_ns_per_event(_maker(name), batch)
                 results.append(_result(trial, name, mode, answers, ns_per_event, with_curve=index == 0))
-    if PHONE in plan.filters and trial.rotation_vector is not None:
-        results.append(_result(trial, PHONE, "native", phone_answers(trial), None, with_curve=True))
+            elif index == 0 and trial.rotation_vector is not None:
+                results.append(_result(trial, PHONE, "native", phone_answers(trial), None, with_curve=True))
     return tuple(results)
 
 

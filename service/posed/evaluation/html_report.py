@@ -29,7 +29,7 @@ def as_html(evaluation: Evaluation) -> str:
     for dataset in dict.fromkeys(result.dataset for result in results):
         own = [result for result in results if result.dataset == dataset]
         mode = own[0].mode
-        groups = [each for each in group_summaries(own) if each.mode == mode]
+        groups = group_summaries(own)
         parts.append(f"<h2>{escape(dataset)}</h2>")
         parts.append(_plot("Mean total error by mode", bars_of_modes(summaries(own), colour)))
         if groups:

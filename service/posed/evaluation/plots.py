@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from posed.errors import MissingExtraError
-from posed.evaluation.evaluate import Result
+from posed.evaluation.evaluate import PHONE, Result
+from posed.evaluation.rates import MODES
 from posed.evaluation.summary import Summary
 
 _INK = "#123456"
@@ -31,22 +32,22 @@ def colours(filters: Sequence[str]) -> dict[str, str]:
 
 def bars_of_modes(summaries: Sequence[Summary], colour: dict[str, str]) -> str:
     """Return the mean total error of each filter by mode, for one data set, as SVG."""
-    modes = list(dict.fromkeys(each.mode for each in summaries))
+    modes = [mode for mode in MODES if any(each.mode == mode for each in summaries)]
     values = {(each.mode, each.filter): each.total_mean for each in summaries}
     return _grouped_bars(modes, [name for name in colour if any(n == name for _, n in values)], values, colour)
 
 
 def bars_of_groups(groups: Sequence[Summary], mode: str, colour: dict[str, str]) -> str:
-    """Return the mean total error of each filter by group at a mode, for one data set, as SVG."""
-    chosen = [each for each in groups if each.mode == mode]
+    """Return the mean total error by group at a mode (the phone's own always), for one data set, as SVG."""
+    chosen = [each for each in groups if each.mode == mode or each.filter == PHONE]
     names = list(dict.fromkeys(each.group for each in chosen))
     values = {(each.group, each.filter): each.total_mean for each in chosen}
     return _grouped_bars(names, [name for name in colour if any(n == name for _, n in values)], values, colour)
 
 
 def bars_of_trials(results: Sequence[Result], mode: str, colour: dict[str, str]) -> str:
-    """Return the total error of each filter by trial at a mode, for one data set, as SVG."""
-    chosen = [each for each in results if each.mode == mode]
+    """Return the total error by trial at a mode (the phone's own always), for one data set, as SVG."""
+    chosen = [each for each in results if each.mode == mode or each.filter == PHONE]
     names = list(dict.fromkeys(each.trial for each in chosen))
     values = {(each.trial, each.filter): each.total for each in chosen}
     return _grouped_bars(names, [name for name in colour if any(n == name for _, n in values)], values, colour, True)
@@ -73,6 +74,8 @@ def _grouped_bars(
     colour: dict[str, str],
     lying: bool = False,
 ) -> str:
+    from matplotlib.ticker import LogLocator, NullLocator
+
     width = 0.8 / max(1, len(filters))
     figure, axes = _figure(9.0, 1.0 + 0.16 * len(names) * (len(filters) + 1) if lying else 3.2)
     drawn = [value for value in values.values() if math.isfinite(value)]
@@ -93,6 +96,10 @@ def _grouped_bars(
     # An aliased mode is ten times worse than the rest: on a linear scale it would leave the rest invisible.
     if drawn and max(drawn) > 12.0 * min(drawn) > 0.0:
         (axes.set_xscale if lying else axes.set_yscale)("log")
+        axis = axes.xaxis if lying else axes.yaxis
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_locator(NullLocator())
         (axes.set_xlim if lying else axes.set_ylim)(0.5 * min(drawn), 1.6 * max(drawn))
     elif drawn:
         (axes.set_xlim if lying else axes.set_ylim)(0.0, 1.12 * max(drawn))

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from math import cos, sin, sqrt
 
-from posed.events import Orientation
+from posed.events import FilterStatus, Orientation
 
 LONGEST_PREDICTION_NS = 500_000_000
 """A filter gives its gyroscope up as lost after as long; a rate that old tells nothing of now."""
@@ -13,10 +13,10 @@ def aligned(orientation: Orientation, instant_ns: int) -> tuple[Orientation, int
     """Return the orientation turned on to `instant_ns` by its own angular rate, and by how much time (ns).
 
     The rate is taken as constant. The timestamp stays that of the newest sample. An instant before it or more than
-    0.5 s behind it leaves the orientation as it is: 0 ns.
+    0.5 s behind it, or a lost gyroscope, leaves the orientation as it is: 0 ns.
     """
     ahead_ns = instant_ns - orientation.timestamp_ns
-    if not 0 < ahead_ns <= LONGEST_PREDICTION_NS:
+    if not 0 < ahead_ns <= LONGEST_PREDICTION_NS or orientation.status & FilterStatus.GYRO_LOST:
         return orientation, 0
     rx, ry, rz = (0.5e-9 * ahead_ns * rate for rate in orientation.angular_rate)
     half = sqrt(rx * rx + ry * ry + rz * rz)
