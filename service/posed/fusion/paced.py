@@ -171,10 +171,14 @@ class PacedFilter(ABC):
             nearer_before = s.has_gyro and each[1] - s.gyro_ns < t - each[1]
             (before if nearer_before else after).append(each)
         s.held = []
+        s.rate = event[2:]
+        stands_for = (t - s.gyro_ns) * 1e-9 / s.periods[0] if s.has_gyro else 1.0
         s.gyro_lost = False
         s.has_gyro = True
         s.gyro_ns = s.newest_ns = t
-        s.rate = event[2:]
+        if abs(stands_for - 1.0) > _PERIOD_TOLERANCE:
+            # Samples were lost, or the rate has changed and is not yet known: the turn at least is to be right.
+            event = (kind, t, event[2] * stands_for, event[3] * stands_for, event[4] * stands_for)
         self._step(before, event, after)
 
     def _note(self, event: FlatEvent) -> None:
