@@ -96,13 +96,15 @@ def run(arguments: argparse.Namespace) -> int:
 def _show(evaluation: Evaluation) -> None:
     console = Console(highlight=False, width=None if sys.stdout.isatty() else 130)
     for each in tables(evaluation):
+        # Not as the table's own title: that is folded to the table's width.
+        console.print(each.title, style="bold")
         console.print(_rich(each))
     for note in NOTES:
         console.print(note)
 
 
 def _rich(shown: ReportTable) -> Table:
-    table = Table(title=shown.title, title_justify="left")
+    table = Table()
     for index, name in enumerate(shown.header):
         table.add_column(name, justify="left" if index < shown.labels else "right", overflow="fold")
     for index, row in enumerate(shown.rows):
