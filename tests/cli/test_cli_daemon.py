@@ -172,3 +172,15 @@ def test_the_systemd_unit_names_a_command_that_exists() -> None:
     assert command in cli.COMMANDS
     assert unit["Service"]["Type"] == "notify"
     assert unit["Service"]["RestartPreventExitStatus"] == str(cli.EX_TEMPFAIL)
+
+
+def test_a_daemon_told_to_align_its_poses_says_so_in_each(shell: Shell) -> None:
+    assert shell.run("start", "--source=sim:pan", "--aligned").returncode == 0
+    seen = shell.run("watch", "--json", "--count", "3", "--mode", "normal")
+    poses = [json.loads(line) for line in seen.stdout.splitlines()]
+    assert len(poses) == 3
+    assert max(pose["predicted_ns"] for pose in poses) > 50_000_000
+    shell.run("stop")
+    shell.run("start", "--source=sim:pan")
+    seen = shell.run("watch", "--json", "--count", "2", "--mode", "normal")
+    assert [json.loads(line)["predicted_ns"] for line in seen.stdout.splitlines()] == [0, 0]

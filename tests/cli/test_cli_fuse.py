@@ -82,3 +82,42 @@ def test_a_recording_without_a_magnetometer_has_no_pose(
     path.write_text("\n".join(kept))
     assert main(["fuse", str(path)]) == 1
     assert "it has no android.sensor.magnetic_field" in capsys.readouterr().err
+
+
+def test_filters_side_by_side_have_the_poses_that_each_has_alone(
+    recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("vqf")
+    assert main(["fuse", str(recording), "--filter", "dcm,vqf"]) == 0
+    both = _rows(capsys.readouterr().out)
+    for name in ("dcm", "vqf"):
+        main(["fuse", str(recording), "--filter", name])
+        alone = _rows(capsys.readouterr().out)
+        assert alone
+        assert [row for row in both if row["filter"] == name] == alone
+    numbers = [int(row["sequence"]) for row in both]
+    assert numbers == sorted(numbers)
+
+
+def test_the_same_filter_twice_is_a_usage_error(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["fuse", str(recording), "--filter", "dcm,dcm"])
+    assert "'dcm,dcm' names a filter twice" in capsys.readouterr().err
+
+
+def test_aligned_poses_say_how_far_they_were_turned_on(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["fuse", str(recording), "--mode", "normal"])
+    held = _rows(capsys.readouterr().out)
+    assert main(["fuse", str(recording), "--mode", "normal", "--aligned"]) == 0
+    turned = _rows(capsys.readouterr().out)
+    assert {row["predicted_ns"] for row in held} == {"0"}
+    assert len(turned) == len(held)
+    for one, other in zip(held, turned, strict=True):
+        instant_ns = 7_000_000_000 + int(other["sequence"]) * 100_000_000
+        assert int(other["timestamp_ns"]) + int(other["predicted_ns"]) == instant_ns
+        same = [one[name] == other[name] for name in ("timestamp_ns", "wz", "status")]
+        assert all(same)
+        # Turned about the vertical by the rate.
+        turn = 2 * (math.atan2(float(other["qz"]), float(other["qw"])) - math.atan2(float(one["qz"]), float(one["qw"])))
+        assert turn == pytest.approx(float(one["wz"]) * int(other["predicted_ns"]) * 1e-9, abs=1e-3)
+    assert max(int(row["predicted_ns"]) for row in turned) >= 100_000_000
