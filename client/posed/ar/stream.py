@@ -1,9 +1,11 @@
 """What the page is fed: the poses of the running service, and the truth where a page asks for it."""
 
+import datetime
 from collections.abc import Callable
 from typing import Any, Protocol
 
 import posed.client as sdk
+from posed.ar.declination import wmm_declination_deg
 from posed.client import Pose, PoseClient, Position, Truth
 
 RATE_MODES = ("NORMAL", "UI", "GAME", "FASTEST")
@@ -40,8 +42,10 @@ class ServiceFeed:
     (m) or null. o: the observer. s: state of the binding, and the reason. v: the phone.
     """
 
-    def __init__(self, rate_mode: str) -> None:
+    def __init__(self, rate_mode: str, *, auto_create: bool) -> None:
+        """auto_create: start a daemon when there is none, at first and whenever it has died."""
         self._rate_mode = rate_mode
+        self._auto_create = auto_create
         self._publish: Publish = lambda key, value: None
         self._poses: PoseClient | None = None
         self._truths: PoseClient | None = None
@@ -52,7 +56,7 @@ class ServiceFeed:
         self._tell_state("CONNECTING", "no daemon has answered yet")
         self._poses = PoseClient(
             _delay(self._rate_mode),
-            auto_create=True,
+            auto_create=self._auto_create,
             on_pose=self._take_pose,
             on_service_connected=self._connected,
             on_service_disconnected=lambda: self._tell_state("DISCONNECTED", "the daemon died or hangs"),
@@ -133,6 +137,9 @@ def observer_message(position: Position) -> dict[str, Any]:
         "longitude": position.longitude_deg,
         "height": position.ellipsoidal_height_m,
         "source": position.source,
+        "wmm_declination_deg": wmm_declination_deg(
+            position.latitude_deg, position.longitude_deg, datetime.date.today()
+        ),
     }
 
 

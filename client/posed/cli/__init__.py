@@ -26,6 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sensors": ("posed.cli.sensors", "list the sensors"),
     "events": ("posed.cli.events", "print a sensor's events as they come"),
     "fuse": ("posed.cli.fuse", "turn a recording into poses, without a daemon"),
+    "ar": ("posed.cli.ar", "open the AR page: georeferenced places held in place by the pose"),
     "profile": ("posed.cli.profile", "measure the CPU that each rate mode costs"),
 }
 

@@ -84,7 +84,7 @@ class Access:
 
     def _has_session(self, headers: Headers) -> bool:
         given = cookie_parser(headers.get("cookie", "")).get(self._cookie, "").encode()
-        return any([hmac.compare_digest(given, session.encode()) for session in self._sessions])
+        return any(hmac.compare_digest(given, session.encode()) for session in self._sessions)
 
     def _renew_token(self) -> None:
         self._token = secrets.token_urlsafe(32)
