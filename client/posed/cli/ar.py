@@ -83,7 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         from posed.ar.stream import ServiceFeed
         from posed.web.server import guarded, listen, make_server
     except ImportError as error:
-        raise MissingExtraError(f"posed ar needs {error.name}; install it with: pip install 'posed[web]'") from error
+        needed = (error.name or str(error)).partition(".")[0]
+        raise MissingExtraError(f"posed ar needs {needed}; install it with: pip install 'posed[web]'") from error
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     places = load_places(arguments.places or SAMPLE, crs=arguments.crs, geoid_undulation_m=arguments.heights)

@@ -23,7 +23,7 @@ def shared_files() -> BaseRoute:
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Return a socket bound to an address; port 0 takes any that is free.
+    """Return a socket that listens, so that who follows the link at once is let wait; port 0 takes any that is free.
 
     Raises InvalidArgumentError if it cannot be had.
     """
@@ -33,6 +33,7 @@ def listen(host: str, port: int) -> socket.socket:
         try:
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             bound.bind((host, port))
+            bound.listen()
         except BaseException:
             bound.close()
             raise
