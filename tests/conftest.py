@@ -1,26 +1,52 @@
-"""What every test may use: the recordings folder, and the rule that a demanded need may not skip."""
+"""What every test may use: the recordings folder, a browser, and the rule that a demanded need may not skip."""
 
 import os
+import shutil
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
 
 import pytest
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
 _PATIENCE_S = 20.0
+_BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+# Without a GPU, a display, or root's wish to be protected from itself; timers of pages behind others go on.
+_BROWSER_ARGUMENTS = (
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--force-color-profile=srgb",
+    "--disable-background-timer-throttling",
+)
 
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """The folder of recordings that POSED_DATA names; skips without it, fails where POSED_REQUIRE demands it."""
     named = os.environ.get("POSED_DATA")
-    if named and Path(named).is_dir():
-        return Path(named)
-    reason = f"POSED_DATA is {named!r}, not a folder of recordings; set it to run this test"
-    if "data" in os.environ.get("POSED_REQUIRE", "").split(","):
-        pytest.fail(reason)
-    pytest.skip(reason)
+    if not named or not Path(named).is_dir():
+        _lacking("data", f"POSED_DATA is {named!r}, not a folder of recordings; set it to run this test")
+    return Path(named)
+
+
+# A module's, not the session's: as long as it is open, this thread has a running event loop.
+@pytest.fixture(scope="module")
+def browser() -> "Iterator[Browser]":
+    """A real Chromium without a window; skips without one, fails where POSED_REQUIRE demands it."""
+    path = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if path is None:
+        _lacking("browser", f"none of {', '.join(_BROWSERS)} is installed; install chromium to run this test")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        started = playwright.chromium.launch(executable_path=path, args=list(_BROWSER_ARGUMENTS))
+        yield started
+        started.close()
 
 
 @pytest.fixture
@@ -35,3 +61,9 @@ def eventually() -> Callable[[Callable[[], object]], None]:
             pause.wait(0.01)
 
     return wait
+
+
+def _lacking(need: str, reason: str) -> NoReturn:
+    if need in os.environ.get("POSED_REQUIRE", "").split(","):
+        pytest.fail(reason)
+    pytest.skip(reason)
