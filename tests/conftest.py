@@ -34,17 +34,23 @@ def data_dir() -> Path:
     return Path(named)
 
 
-# A module's, not the session's: as long as it is open, this thread has a running event loop.
-@pytest.fixture(scope="module")
-def browser() -> "Iterator[Browser]":
-    """A real Chromium without a window; skips without one, fails where POSED_REQUIRE demands it."""
+@pytest.fixture(scope="session")
+def browser_path() -> str:
+    """Where Chromium is; skips without one, fails where POSED_REQUIRE demands it."""
     path = next(filter(None, map(shutil.which, _BROWSERS)), None)
     if path is None:
         _lacking("browser", f"none of {', '.join(_BROWSERS)} is installed; install chromium to run this test")
+    return path
+
+
+# A module's, not the session's: as long as it is open, this thread has a running event loop.
+@pytest.fixture(scope="module")
+def browser(browser_path: str) -> "Iterator[Browser]":
+    """A real Chromium without a window."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=path, args=list(_BROWSER_ARGUMENTS))
+        started = playwright.chromium.launch(executable_path=browser_path, args=list(_BROWSER_ARGUMENTS))
         yield started
         started.close()
 
