@@ -59,6 +59,12 @@ export class Background {
     return this.view;
   }
 
+  /** Hold a camera's picture still, or let it go on. */
+  hold(isHeld) {
+    if (isHeld) this._video.pause();
+    else if (this.view === "camera") void this._video.play();
+  }
+
   /** Draw the view if it is a drawn one; the projector is to be aimed. */
   draw(places) {
     if (this.view === "panorama" && this._panorama.isLoaded) {

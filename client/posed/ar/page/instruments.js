@@ -1,6 +1,6 @@
 /** Crosses, heading tape, roll and pitch scales: what the fused pose says, drawn as instruments. */
 
-import { format } from "./angles.js";
+import { format, formatBearing } from "./angles.js";
 import { BLUE, QUIET, WHITE, YELLOW, font, plate, strokeOutlined } from "./draw.js";
 
 const DEGREE = Math.PI / 180;
@@ -104,9 +104,8 @@ export class Instruments {
   _drawHeadings(heading, { angle, source }, middle, unit) {
     const context = this._context;
     const digits = unit === "dms" ? 0 : 1;
-    const round = (rad) => format(((rad % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI), unit, digits);
-    const truth = `${round(heading)} true`;
-    const magnetic = `${round(heading - angle)} magnetic`;
+    const truth = `${formatBearing(heading, unit, digits)} true`;
+    const magnetic = `${formatBearing(heading - angle, unit, digits)} magnetic`;
     const top = TAPE_TOP + TAPE_HEIGHT + 3;
     context.font = VALUE_FONT;
     const truthWidth = context.measureText(truth).width;

@@ -1,10 +1,9 @@
 /** The places as the fused pose sees them: outlines, dots, labels that do not overlap, arrows to what is outside. */
 
-import { place as declutter } from "./declutter.js";
+import { Declutter } from "./declutter.js";
 import { DARK, LabelCache, RED, WHITE, formatDistance, strokeOutlined } from "./draw.js";
 
 const DOT_RADIUS = 5;
-const ABOVE_DOT = 30;
 // Labels nearest first; what is farther shows its dot only.
 const MOST_LABELS = 48;
 const ARROWS = 3;
@@ -29,6 +28,7 @@ export class Overlay {
     this._context = context;
     this._to = projector;
     this._labels = new LabelCache();
+    this._declutter = new Declutter();
     this._inCamera = new Float64Array(3);
     /** Where the last drawing put each place, nearest first. @type {Drawn[]} */
     this.drawn = [];
@@ -142,8 +142,8 @@ export class Overlay {
       const picture = this._labels.get(place.name, formatDistance(this._distance(place)), place === target);
       labels.push({
         id: place.id,
-        x: dot.x - picture.width / 2,
-        y: dot.y - ABOVE_DOT - picture.height / 2,
+        x: 0,
+        y: 0,
         width: picture.width,
         height: picture.height,
         priority: place === target ? Infinity : -place.distance,
@@ -154,7 +154,7 @@ export class Overlay {
         hidden: false,
       });
     }
-    this._takePlaced(declutter(labels, free));
+    this._declutter.place(labels, free);
     context.beginPath();
     for (const label of labels) {
       if (label.hidden) continue;
@@ -171,12 +171,6 @@ export class Overlay {
       context.drawImage(label.picture, label.x, label.y, label.width, label.height);
     }
     context.globalAlpha = 1;
-  }
-
-  _takePlaced(placed) {
-    for (let i = 0; i < placed.length; i++) {
-      if (placed[i] !== this._candidates[i]) Object.assign(this._candidates[i], placed[i]);
-    }
   }
 
   _distance({ anchor }) {

@@ -18,7 +18,7 @@ const EYE_M = 1.7;
  * @property {?number} ground  up of the ground under a point, m
  * @property {Float64Array[]} rings  ENU m, x y z after each other; rings of polygons are closed; none for points
  * @property {number} distance  m, from the origin to the anchor
- * @property {{latitude:number, longitude:number, height:number}} position  of the anchor
+ * @property {{latitude:number, longitude:number, height:?number}} position  of the anchor; null: no height is known
  */
 
 export class Places {
@@ -60,7 +60,9 @@ export class Places {
 
   _workOut(origin) {
     this.origin = origin;
-    const seen = ([longitude, latitude, height]) => refract(enu(origin, { latitude, longitude, height }));
+    // What has no height is drawn level with the observer.
+    const seen = ([longitude, latitude, height]) =>
+      refract(enu(origin, { latitude, longitude, height: height ?? origin.height }));
     this.all = this._raw.map((raw) => workedOut(raw, seen));
     this.all.sort((a, b) => a.distance - b.distance);
     const grounds = this.all
@@ -102,5 +104,6 @@ function positionOf(raw) {
   if (raw.kind === "point") return raw.coordinates[0];
   if (raw.kind === "line") return raw.coordinates[raw.coordinates.length >> 1];
   const corners = raw.coordinates[0].slice(0, -1);
-  return [0, 1, 2].map((axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length);
+  const mean = (axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length;
+  return [mean(0), mean(1), corners.some((corner) => corner[2] === null) ? null : mean(2)];
 }

@@ -1,6 +1,6 @@
 /** The figures beside the view, the banner when no pose comes, and what is said to screen readers. */
 
-import { format } from "./angles.js";
+import { format, formatBearing } from "./angles.js";
 import { formatDistance } from "./draw.js";
 
 const STATUS = ["initialising", "at rest", "magnetic disturbance", "gyroscope lost", "free fall", "gap", "bad sample"];
@@ -74,7 +74,7 @@ export class Readout {
     document.getElementById("target-clear").hidden = !isHeld;
     this.write("target-name", target?.name ?? "No target under the cross");
     this.write("target-note", target?.note ?? "");
-    this.write("target-bearing", format(sight.bearing, unit, digits));
+    this.write("target-bearing", formatBearing(sight.bearing, unit, digits));
     this.write("target-elevation", format(sight.elevation, unit, digits));
     this.write("target-distance", target === null ? "–" : formatDistance(sight.distance));
   }

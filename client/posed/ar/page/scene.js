@@ -1,5 +1,6 @@
 /** What is known and what was asked for, and what follows: the orientations and places that the page draws. */
 
+import { format } from "./angles.js";
 import { Camera } from "./camera.js";
 import { aboutUp, conjugate, extrapolate, multiply } from "./quaternion.js";
 import { Places } from "./places.js";
@@ -16,7 +17,7 @@ export class Scene {
   constructor() {
     this.camera = makeCamera(1, 1, 65, 0);
     this.places = new Places();
-    this.settings = { declination_deg: null, declination_source: null, wmm_declination_deg: null, position: null };
+    this.settings = { declination_deg: null, wmm_declination_deg: null, position: null, background: null };
     /** What the user chose; null follows the device, the server or the truth. */
     this.chosen = { fovDeg: null, rotation: null, declination: null, view: "world", unit: "deg", extrapolate: false };
     this.device = { name: "", fov_deg: 65, rotation: 0 };
@@ -32,19 +33,39 @@ export class Scene {
     this._previousTruth = null;
     this._arrivals = new Float64Array(PACE_KEPT);
     this._arrived = 0;
+    this._frozen = null;
   }
 
   /** Take the pose of a frame that arrived at `at` (performance.now()). */
   takePose(pose, at) {
-    this.pose = pose;
+    if (this._frozen === null) this.pose = pose;
+    else this._frozen.pose = pose;
     this.poseAt = at;
     this._arrivals[this._arrived++ % PACE_KEPT] = at;
   }
 
   takeTruth(truth, at) {
+    this.truthAt = at;
+    if (this._frozen !== null) return;
     this._previousTruth = this.truth;
     this.truth = truth;
-    this.truthAt = at;
+  }
+
+  /** Hold still what is seen at an instant, until `thaw`: what is dragged must not move by itself. */
+  freeze(bootMs) {
+    this._frozen = { bootMs, pose: this.pose };
+  }
+
+  thaw() {
+    if (this._frozen === null) return;
+    this.pose = this._frozen.pose;
+    // The step from before to after says nothing of the rate.
+    this._previousTruth = null;
+    this._frozen = null;
+  }
+
+  get isFrozen() {
+    return this._frozen !== null;
   }
 
   takeObserver(place) {
@@ -79,9 +100,8 @@ export class Scene {
     if (this.chosen.declination !== null) return { angle: this.chosen.declination, source: "entered" };
     if (this.settings.declination_deg !== null) return { angle: this.settings.declination_deg * DEGREE, source: "given" };
     if (this.truth !== null) return { angle: this.truth.d * DEGREE, source: "truth" };
-    if (this.settings.wmm_declination_deg != null) {
-      return { angle: this.settings.wmm_declination_deg * DEGREE, source: "WMM2025" };
-    }
+    const modelled = this.observer?.wmm_declination_deg ?? this.settings.wmm_declination_deg;
+    if (modelled !== null) return { angle: modelled * DEGREE, source: "WMM 2025" };
     return { angle: 0, source: "unknown" };
   }
 
@@ -103,6 +123,7 @@ export class Scene {
   /** The fused orientation against true north, before any correction; at `bootMs`, or at the pose's sample time. */
   poseOrientation(bootMs = NaN) {
     const { q, w, t } = this.pose;
+    if (this._frozen !== null && !Number.isNaN(bootMs)) bootMs = this._frozen.bootMs;
     const ahead = Math.min(Math.max((bootMs - t) / 1000, 0), LONGEST_POSE_STEP_S);
     return multiply(aboutUp(-this.declination.angle), ahead > 0 ? extrapolate(q, w, ahead) : q);
   }
@@ -117,10 +138,21 @@ export class Scene {
   truthOrientation(bootMs) {
     const { q, t } = this.truth;
     const before = this._previousTruth;
-    const ahead = (bootMs - t) / 1000;
+    const ahead = ((this._frozen?.bootMs ?? bootMs) - t) / 1000;
     if (before === null || !(ahead > 0) || t <= before.t || t - before.t > 1000 * LONGEST_TRUTH_STEP_S) return q;
     const rate = rateBetween(before.q, q, (t - before.t) / 1000);
     return extrapolate(q, rate, Math.min(ahead, LONGEST_TRUTH_STEP_S));
+  }
+
+  /** The correction in a few words. */
+  describeCorrection() {
+    const { name, headingOffset, position } = this.correction;
+    if (headingOffset === 0 && position === null) return "none";
+    if (name) return name;
+    const parts = [];
+    if (headingOffset !== 0) parts.push(format(headingOffset, this.chosen.unit, this.chosen.unit === "dms" ? 0 : 1));
+    if (position !== null) parts.push("position");
+    return parts.join(", ");
   }
 
   /** Fit the camera to a window of so many CSS pixels. */
