@@ -70,7 +70,7 @@ def notes(report: Report) -> list[str]:
         lines.insert(
             -2,
             f"AR application: posed ar and its page in a headless Chromium of {WINDOW[0]} x {WINDOW[1]} pixels, all its"
-            " processes, drawing 60 times a second without a GPU.",
+            " processes, drawing without a GPU.",
         )
     for mode, each in report.modes.items():
         if each.modes_in_force and each.modes_in_force != (mode,):
