@@ -19,26 +19,27 @@ const MOST = 2000;
  * @property {string} correction  @property {string} mode  @property {number} sequence  of the pose
  */
 
+/** Name of a column, what it holds, and the decimals of a number. */
 const COLUMNS = [
   ["time", (sight) => sight.time],
   ["name", (sight) => sight.name],
-  ["bearing_deg", (sight) => fixed(sight.bearing, 3)],
-  ["elevation_deg", (sight) => fixed(sight.elevation, 3)],
-  ["distance_m", (sight) => fixed(sight.distance, 2)],
-  ["camera_bearing_deg", (sight) => fixed(sight.cameraBearing, 3)],
-  ["camera_elevation_deg", (sight) => fixed(sight.cameraElevation, 3)],
-  ["heading_accuracy_deg", (sight) => fixed(sight.headingAccuracy, 2)],
-  ["declination_deg", (sight) => fixed(sight.declination, 3)],
+  ["bearing_deg", (sight) => sight.bearing, 3],
+  ["elevation_deg", (sight) => sight.elevation, 3],
+  ["distance_m", (sight) => sight.distance, 2],
+  ["camera_bearing_deg", (sight) => sight.cameraBearing, 3],
+  ["camera_elevation_deg", (sight) => sight.cameraElevation, 3],
+  ["heading_accuracy_deg", (sight) => sight.headingAccuracy, 2],
+  ["declination_deg", (sight) => sight.declination, 3],
   ["correction", (sight) => sight.correction],
   ["rate_mode", (sight) => sight.mode],
-  ["pose_sequence", (sight) => sight.sequence],
-  ["position_latitude", (sight) => fixed(sight.position?.latitude, 8)],
-  ["position_longitude", (sight) => fixed(sight.position?.longitude, 8)],
-  ["position_height_m", (sight) => fixed(sight.position?.height, 2)],
+  ["pose_sequence", (sight) => sight.sequence, 0],
+  ["position_latitude", (sight) => sight.position?.latitude, 8],
+  ["position_longitude", (sight) => sight.position?.longitude, 8],
+  ["position_height_m", (sight) => sight.position?.height, 2],
   ["place_id", (sight) => sight.id],
-  ["place_latitude", (sight) => fixed(sight.place?.latitude, 8)],
-  ["place_longitude", (sight) => fixed(sight.place?.longitude, 8)],
-  ["place_height_m", (sight) => fixed(sight.place?.height, 2)],
+  ["place_latitude", (sight) => sight.place?.latitude, 8],
+  ["place_longitude", (sight) => sight.place?.longitude, 8],
+  ["place_height_m", (sight) => sight.place?.height, 2],
 ];
 
 export class Book {
@@ -125,8 +126,8 @@ export class Book {
 
 /** The sights as CSV (RFC 4180). */
 export function toCsv(sights) {
-  const rows = [COLUMNS.map(([name]) => name), ...sights.map((sight) => COLUMNS.map(([, of]) => of(sight)))];
-  return rows.map((row) => `${row.map(quoted).join(",")}\r\n`).join("");
+  const rows = sights.map((sight) => COLUMNS.map(([, of, digits]) => cell(of(sight), digits)));
+  return [COLUMNS.map(([name]) => name), ...rows].map((row) => `${row.join(",")}\r\n`).join("");
 }
 
 /** The sights as GeoJSON (RFC 7946): points at the places; free sights at the position they were taken from. */
@@ -134,7 +135,7 @@ export function toGeoJson(sights) {
   const features = sights.map((sight) => ({
     type: "Feature",
     geometry: geometryOf(sight.place ?? sight.position),
-    properties: Object.fromEntries(COLUMNS.map(([name, of]) => [name, numberOrText(of(sight))])),
+    properties: Object.fromEntries(COLUMNS.map(([name, of, digits]) => [name, rounded(of(sight), digits)])),
   }));
   return `${JSON.stringify({ type: "FeatureCollection", features }, null, 1)}\n`;
 }
@@ -145,18 +146,13 @@ function geometryOf(position) {
   return { type: "Point", coordinates: height === null ? [longitude, latitude] : [longitude, latitude, height] };
 }
 
-function numberOrText(value) {
-  if (value === "") return null;
-  return typeof value === "string" && /^-?\d+(\.\d+)?$/.test(value) ? Number(value) : value;
-}
-
-function quoted(value) {
-  const text = `${value}`;
+function cell(value, digits) {
+  const text = typeof value === "number" ? value.toFixed(digits) : (value ?? "");
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
 
-function fixed(value, digits) {
-  return value === null || value === undefined ? "" : value.toFixed(digits);
+function rounded(value, digits) {
+  return typeof value === "number" ? Number(value.toFixed(digits)) : (value ?? null);
 }
 
 function radians(degrees) {

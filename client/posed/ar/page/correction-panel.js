@@ -232,8 +232,10 @@ export class CorrectionPanel {
     event.preventDefault();
     const field = event.target.elements.name;
     const name = field.value.trim();
-    if (name === "" || name.includes("/") || name === "." || name === "..") {
-      this._complain("#save", name === "" ? "Give the correction a name." : "The name is to have no slash, and more than dots.", field);
+    // A path of the server: a slash would part it, dots alone would lead elsewhere.
+    if (name === "" || /\/|^\.\.?$/.test(name)) {
+      const remedy = name === "" ? "Give the correction a name." : `“${name}” is no name: leave out slashes, and dots alone.`;
+      this._complain("#save", remedy, field);
       return;
     }
     const { headingOffset, position } = this._scene.correction;

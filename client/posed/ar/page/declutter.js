@@ -25,10 +25,17 @@ export class Declutter {
     this._placed = [];
   }
 
-  /** Place labels within `free` ({left, top, right, bottom}); by priority, each where it was before if that will do. */
-  place(labels, free) {
+  /**
+   * Place labels, by priority, each where it was before if that will do; else rather not over others' dots.
+   *
+   * @param {Label[]} labels
+   * @param {{left:number, top:number, right:number, bottom:number}} free
+   * @param {{x:number, y:number, width:number, height:number}} cross  to be left free
+   */
+  place(labels, free, cross) {
     this._order.length = 0;
     this._placed.length = 0;
+    this._placed.push(cross);
     this._now.clear();
     for (const label of labels) this._order.push(label);
     this._order.sort(byPriority);
@@ -46,8 +53,16 @@ export class Declutter {
     if (before != null && this._fits(label, before, free, GAP)) return before;
     // One that is new or moves needs no more room than others do; one that was hidden does.
     const gap = before === null ? GAP + ROOM_TO_RETURN : GAP;
+    for (const slot of SLOTS) if (this._fits(label, slot, free, gap) && !this._coversDot(label)) return slot;
     for (const slot of SLOTS) if (this._fits(label, slot, free, gap)) return slot;
     return null;
+  }
+
+  _coversDot({ x, y, width, height }) {
+    for (const { anchorX, anchorY } of this._order) {
+      if (anchorX > x - GAP && anchorX < x + width + GAP && anchorY > y - GAP && anchorY < y + height + GAP) return true;
+    }
+    return false;
   }
 
   _fits(label, slot, free, gap) {

@@ -59,6 +59,8 @@ export function formatDistance(metres) {
 
 const LABEL_HEIGHT = 22;
 const MOST_LABELS = 400;
+// Of the screen's width; a phone is to show more than one name.
+const LONGEST_NAME = 0.3;
 const LONGEST_NAME_PX = 190;
 
 /** Labels drawn once and kept: measuring and drawing text anew each frame would be most of the frame's time. */
@@ -68,10 +70,11 @@ export class LabelCache {
     this.scale = 1;
   }
 
-  /** Forget all: the resolution changed. */
-  clear(scale) {
+  /** Forget all: the resolution or the width of the screen changed. */
+  clear(scale, screenWidth) {
     this._kept.clear();
     this.scale = scale;
+    this._longest = Math.min(LONGEST_NAME_PX, screenWidth * LONGEST_NAME);
   }
 
   /** @returns {{canvas: HTMLCanvasElement, width: number, height: number}} */
@@ -80,20 +83,20 @@ export class LabelCache {
     let label = this._kept.get(key);
     if (label === undefined) {
       if (this._kept.size >= MOST_LABELS) this._kept.clear();
-      label = drawLabel(name, detail, isTarget, this.scale);
+      label = drawLabel(name, detail, isTarget, this.scale, this._longest);
       this._kept.set(key, label);
     }
     return label;
   }
 }
 
-function drawLabel(name, detail, isTarget, scale) {
+function drawLabel(name, detail, isTarget, scale, longest) {
   const canvas = document.createElement("canvas");
   const context = canvas.getContext("2d");
   const nameFont = font(13, 600);
   const detailFont = font(12);
   context.font = nameFont;
-  const shown = shortened(context, name);
+  const shown = shortened(context, name, longest);
   const nameWidth = Math.ceil(context.measureText(shown).width);
   context.font = detailFont;
   const detailWidth = Math.ceil(context.measureText(detail).width);
@@ -129,9 +132,9 @@ function drawLabel(name, detail, isTarget, scale) {
   return { canvas, width, height: LABEL_HEIGHT };
 }
 
-function shortened(context, name) {
-  if (context.measureText(name).width <= LONGEST_NAME_PX) return name;
+function shortened(context, name, longest) {
+  if (context.measureText(name).width <= longest) return name;
   const letters = Array.from(name);
-  while (letters.length > 1 && context.measureText(`${letters.join("")}…`).width > LONGEST_NAME_PX) letters.pop();
+  while (letters.length > 1 && context.measureText(`${letters.join("")}…`).width > longest) letters.pop();
   return `${letters.join("").trimEnd()}…`;
 }

@@ -31,7 +31,7 @@ export class Frame {
     this.overlay = new Overlay(this._context, this.projector);
     this._instruments = new Instruments(this._context);
     this._thumbnail = new Thumbnail(document.querySelector("#thumbnail"));
-    this._free = { left: LEFT_OF_LABELS, top: Instruments.bottomOfTop, right: 0, bottom: 0 };
+    this._free = { left: LEFT_OF_LABELS, top: 0, right: 0, bottom: 0 };
     this._seen = { q: [0, 0, 0, 0], eye: [0, 0, 0] };
     this._scale = 1;
     this._isForced = true;
@@ -49,7 +49,7 @@ export class Frame {
     const { innerWidth: width, innerHeight: height } = window;
     this._scene.fitCamera(width, height);
     this._scale = fit(this._canvas, width, height);
-    this.overlay.resize(this._scale);
+    this.overlay.resize(this._scale, width);
     this.background.resize(width, height);
     this._thumbnail.resize();
     this.makeRoom();
@@ -153,7 +153,7 @@ function attitudeOf({ axes, pitchSine, upX, upY }) {
 
 /** Where labels may be: between the instruments at the top and what lies at the foot or the side. */
 function freeSpace(width, height) {
-  const free = { left: LEFT_OF_LABELS, top: Instruments.bottomOfTop, right: width - MARGIN, bottom: height - MARGIN };
+  const free = { left: LEFT_OF_LABELS, top: Instruments.bottomOf(height), right: width - MARGIN, bottom: height - MARGIN };
   for (const element of document.querySelectorAll("#thumbnail, #target, #readout, #modes, .panel")) {
     const box = element.getBoundingClientRect();
     if (box.width === 0) continue;

@@ -8,6 +8,9 @@ const TAPE_HEIGHT = 36;
 const TAPE_TOP = 10;
 const WIDEST_TAPE = 540;
 const VALUE_HEIGHT = 24;
+const TOP_OF_ROLL = TAPE_TOP + TAPE_HEIGHT + VALUE_HEIGHT + 20;
+const ROLL_HEIGHT = 52;
+const LOW = 560;
 const ROLL_RADIUS = 150;
 const ROLL_REACH = 40;
 const PITCH_PER_DEGREE = 5;
@@ -26,9 +29,9 @@ export class Instruments {
     this._context = context;
   }
 
-  /** Where the instruments of the top end, CSS pixels. */
-  static get bottomOfTop() {
-    return TAPE_TOP + TAPE_HEIGHT + VALUE_HEIGHT + 20;
+  /** Where the instruments of the top end, CSS pixels; on a low screen labels may lie about the roll scale. */
+  static bottomOf(screenHeight) {
+    return screenHeight < LOW ? TOP_OF_ROLL : TOP_OF_ROLL + ROLL_HEIGHT;
   }
 
   /**
@@ -135,7 +138,7 @@ export class Instruments {
   _drawRoll(roll, screenWidth) {
     const context = this._context;
     const x = screenWidth / 2;
-    const top = Instruments.bottomOfTop + 14;
+    const top = TOP_OF_ROLL + 14;
     const y = top + ROLL_RADIUS;
     const from = -Math.PI / 2 - ROLL_REACH * DEGREE;
     const to = -Math.PI / 2 + ROLL_REACH * DEGREE;
@@ -169,7 +172,7 @@ export class Instruments {
 
   _drawPitch(pitch, camera) {
     const context = this._context;
-    const isLow = camera.height < 560;
+    const isLow = camera.height < LOW;
     const half = Math.min(110, camera.height * 0.19);
     const x = isLow ? camera.width - PITCH_WIDTH - 10 : 10;
     const y = camera.height / 2;

@@ -8,9 +8,10 @@ const DOT_RADIUS = 5;
 const MOST_LABELS = 48;
 const ARROWS = 3;
 const HIT_RADIUS = 22;
-// From the edge of the free space to the middle of an arrow, and how far it may be moved along it, in names.
+// From the edge of the free space to the middle of an arrow, and the places along the edge it may be moved to.
 const EDGE = 18;
 const EDGE_SLOTS = 7;
+const CROSS_PX = 30;
 
 /**
  * @typedef {Object} Drawn
@@ -34,10 +35,11 @@ export class Overlay {
     this.drawn = [];
     this._candidates = [];
     this._takenAtEdge = [];
+    this._cross = { x: 0, y: 0, width: 2 * CROSS_PX, height: 2 * CROSS_PX };
   }
 
-  resize(scale) {
-    this._labels.clear(scale);
+  resize(scale, screenWidth) {
+    this._labels.clear(scale, screenWidth);
   }
 
   /**
@@ -46,6 +48,8 @@ export class Overlay {
    * @param {{left:number, top:number, right:number, bottom:number}} free  of instruments, CSS pixels
    */
   draw(places, target, free) {
+    this._cross.x = this._to.camera.width / 2 - CROSS_PX;
+    this._cross.y = this._to.camera.height / 2 - CROSS_PX;
     this._project(places);
     this._drawShapes(places, target);
     this._drawLabels(places, target, free);
@@ -154,7 +158,7 @@ export class Overlay {
         hidden: false,
       });
     }
-    this._declutter.place(labels, free);
+    this._declutter.place(labels, free, this._cross);
     context.beginPath();
     for (const label of labels) {
       if (label.hidden) continue;
@@ -199,33 +203,37 @@ export class Overlay {
     const { width, height } = this._to.camera;
     const dx = right / aside;
     const dy = -up / aside;
-    const reach = Math.min(
-      ((dx > 0 ? free.right - width / 2 : width / 2 - free.left) - EDGE) / Math.max(Math.abs(dx), 1e-9),
-      ((dy > 0 ? free.bottom - height / 2 : height / 2 - free.top) - EDGE) / Math.max(Math.abs(dy), 1e-9),
-    );
+    const toSide = ((dx > 0 ? free.right - width / 2 : width / 2 - free.left) - EDGE) / Math.max(Math.abs(dx), 1e-9);
+    const toEnd = ((dy > 0 ? free.bottom - height / 2 : height / 2 - free.top) - EDGE) / Math.max(Math.abs(dy), 1e-9);
+    const reach = Math.max(Math.min(toSide, toEnd), 0);
     const x = width / 2 + dx * reach;
     const y = height / 2 + dy * reach;
     const away = isTarget ? `${Math.round((Math.atan2(aside, ahead) * 180) / Math.PI)}°` : "";
     const picture = this._labels.get(name, away, isTarget);
-    const box = this._freeBox(x, y, dx, dy, picture, free);
+    const box = this._freeBox(x, y, dx, dy, toSide < toEnd, picture, free);
     if (box === null) return false;
     this._context.drawImage(picture.canvas, box.x, box.y, picture.width, picture.height);
-    this._drawArrowHead(x, y + box.moved, Math.atan2(dy, dx), isTarget);
+    this._drawArrowHead(x + box.movedX, y + box.movedY, Math.atan2(dy, dx), isTarget);
     return true;
   }
 
   /** Room for an arrow's name inwards of it; where another is, the arrow moves along the edge to free room. */
-  _freeBox(x, y, dx, dy, { width, height }, free) {
-    const inwardsX = x - dx * (EDGE + width / 2) - width / 2;
-    const inwardsY = y - dy * (EDGE + height / 2) - height / 2;
-    const boxX = clamp(inwardsX, free.left + 4, free.right - width - 4);
+  _freeBox(x, y, dx, dy, isAtSide, { width, height }, free) {
+    const inwardsX = x - (isAtSide ? Math.sign(dx) * (EDGE + width / 2) : 0) - width / 2;
+    const inwardsY = y - (isAtSide ? 0 : Math.sign(dy) * (EDGE + height / 2)) - height / 2;
     for (let slot = 0; slot < EDGE_SLOTS; slot++) {
-      const moved = (slot % 2 ? -1 : 1) * Math.ceil(slot / 2) * (height + 6);
-      const boxY = inwardsY + moved;
-      if (boxY < free.top || boxY + height > free.bottom) continue;
-      const box = { x: boxX, y: boxY, width, height, moved };
+      const steps = (slot % 2 ? -1 : 1) * Math.ceil(slot / 2);
+      const movedX = isAtSide ? 0 : steps * (width + 10);
+      const movedY = isAtSide ? steps * (height + 6) : 0;
+      const box = { x: inwardsX + movedX, y: inwardsY + movedY, width, height, movedX, movedY };
+      if (box.y < free.top || box.y + height > free.bottom) continue;
+      if (x + movedX < free.left || x + movedX > free.right) continue;
+      // At the top and the foot a name may be longer than half the way to the corner.
+      box.x = clamp(box.x, free.left + 4, free.right - width - 4);
+      if (overlap(box, this._cross)) continue;
       if (this._takenAtEdge.some((other) => overlap(box, other))) continue;
       if (this._candidates.some((label) => !label.hidden && overlap(box, label))) continue;
+      if (this.drawn.some((dot) => dot.visible && covers(box, dot))) continue;
       this._takenAtEdge.push(box);
       return box;
     }
@@ -254,6 +262,11 @@ export class Overlay {
 
 function overlap(a, b) {
   return a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
+}
+
+function covers(box, { x, y }) {
+  const reach = DOT_RADIUS + 3;
+  return x > box.x - reach && x < box.x + box.width + reach && y > box.y - reach && y < box.y + box.height + reach;
 }
 
 function clamp(value, low, high) {

@@ -135,7 +135,7 @@ export class World {
     context.fillStyle = HILL;
     for (let i = places.all.length - 1; i >= 0; i--) {
       const { anchor, ground, kind, distance } = places.all[i];
-      if (distance < FAR_M) return;
+      if (distance < FAR_M) break;
       if (kind !== "point" || ground === null || anchor[2] <= ground) continue;
       const spread = (2.6 * (anchor[2] - ground)) / distance;
       context.globalAlpha = distance > 40_000 ? 0.45 : 0.75;
