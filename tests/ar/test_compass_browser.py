@@ -30,7 +30,7 @@ def page(browser: Browser, feed: SteppedFeed, tmp_path_factory: pytest.TempPathF
     with Served(feed, ArContent(places_around(QUARTERS), {}), store) as served:
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         page.goto(served.links[-1])
-        page.wait_for_function("window.posedAr !== undefined")
+        page.wait_for_function("() => window.posedAr !== undefined")
         with feed.asked:
             assert feed.asked.wait_for(lambda: feed.wishes[-1:] == [True], 20), "the page asks for no truth"
         yield page
