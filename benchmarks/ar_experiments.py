@@ -77,7 +77,7 @@ def main() -> int:
             "panning at 100 deg/s, p95": [newest],
             "- extrapolated": [extrapolated],
         }.items():
-            rows.setdefault(name, []).append("   ".join(f"{value:.2f}° {_pixels(value, fov_deg)}" for value in values))
+            rows.setdefault(name, []).append("   ".join(f"{value:.2f}° {pixels(value, fov_deg)}" for value in values))
     table = Table(title="Error of the overlay", title_justify="left")
     table.add_column("")
     for mode in MODES:
@@ -107,10 +107,12 @@ def repeatability(mode: RateMode) -> tuple[float, float]:
         heading = target.heading - done.declination
         level = math.cos(target.elevation)
         wanted = np.array([level * math.sin(heading), level * math.cos(heading), math.sin(target.elevation)])
-        on_target = _camera(true) @ wanted > math.cos(math.radians(_ON_TARGET_DEG))
+        on_target = camera_axis(true) @ wanted > math.cos(math.radians(_ON_TARGET_DEG))
         begun = np.flatnonzero(np.diff(on_target.astype(int)) == 1) + 1
         visits = np.cumsum(np.isin(np.arange(len(on_target)), begun))[on_target]
-        offsets = (_direction_deg(_camera(fused)) - _direction_deg(_camera(true)) + 180.0)[on_target] % 360.0 - 180.0
+        offsets = (_direction_deg(camera_axis(fused)) - _direction_deg(camera_axis(true)) + 180.0)[
+            on_target
+        ] % 360.0 - 180.0
         offsets[:, 0] *= level  # degrees of heading are shorter up there
         returns = np.array([offsets[visits == visit].mean(axis=0) for visit in np.unique(visits)])
         means.append(float(np.linalg.norm(returns, axis=1).mean()))
@@ -124,8 +126,8 @@ def shake(mode: RateMode) -> tuple[float, float]:
     raw = raw_axes(done.accelerometer, done.magnetometer)
     sampled = done.magnetometer.timestamp_ns
     return (
-        float(_overlay_error_deg(raw, _true_axes(done, sampled)).max()),
-        float(_overlay_error_deg(axes(done.quaternions), _true_axes(done, _fused_until_ns(done))).max()),
+        float(overlay_error_deg(raw, _true_axes(done, sampled)).max()),
+        float(overlay_error_deg(axes(done.quaternions), _true_axes(done, _fused_until_ns(done))).max()),
     )
 
 
@@ -138,8 +140,8 @@ def all_orientations(mode: RateMode) -> tuple[float, float, float, float, float]
     for script in TURNS:
         done = simulate(script, 40, _filter, mode, warm_up_s=_WARM_UP_S)
         fused, true = axes(done.quaternions), _true_axes(done, _fused_until_ns(done))
-        error = _overlay_error_deg(fused, true)
-        up = _camera(true)[:, 2]
+        error = overlay_error_deg(fused, true)
+        up = camera_axis(true)[:, 2]
         rests = np.abs(np.diff(np.stack(true), axis=1, prepend=np.nan)).max(axis=(0, 2)) < 1e-6
         steep = math.cos(math.radians(_STEEP_DEG))
         found.append(
@@ -185,7 +187,7 @@ def panning(mode: RateMode, delay_ms: float) -> tuple[float, float]:
     rates = np.array([pose.orientation.angular_rate for pose in done.poses])[newest]
     turned = _multiply(quaternions, _of_rotation_vector(rates * elapsed_s[:, None]))
     return tuple(  # type: ignore[return-value]
-        float(np.percentile(_overlay_error_deg(axes(q), true), 95)) for q in (quaternions, turned)
+        float(np.percentile(overlay_error_deg(axes(q), true), 95)) for q in (quaternions, turned)
     )
 
 
@@ -226,7 +228,7 @@ def _fused_until_ns(done: Simulation) -> Int64Array:
     return np.array([pose.orientation.timestamp_ns for pose in done.poses])
 
 
-def _camera(of: Axes) -> Float64Array:
+def camera_axis(of: Axes) -> Float64Array:
     """Return where the camera (device -z) looks, ENU, float64[n, 3]."""
     return -np.stack([axis[:, 2] for axis in of], axis=1)
 
@@ -236,23 +238,35 @@ def _in_device(direction: Float64Array, of: Axes) -> Float64Array:
     return np.asarray(sum(direction[:, i : i + 1] * of[i] for i in range(3)))
 
 
-def _overlay_error_deg(estimate: Axes, true: Axes) -> Float64Array:
-    drawn = _in_device(_camera(true), estimate)
+def overlay_error_deg(estimate: Axes, true: Axes) -> Float64Array:
+    """Return the angle (deg[n]) between where an estimate draws the object in the middle of the true view and there."""
+    drawn = _in_device(camera_axis(true), estimate)
     return np.asarray(np.degrees(np.arccos(np.clip(-drawn[:, 2] / np.linalg.norm(drawn, axis=1), -1, 1))))
 
 
 def _worst(fused: Axes, true: Axes) -> tuple[float, float]:
     """Return the overlay's largest error (deg) and its largest change from one pose to the next."""
     # The object that the true view has in its middle, in the axes of the fused view: none but the error moves it.
-    seen = _in_device(_camera(true), fused)
+    seen = _in_device(camera_axis(true), fused)
     cosine = np.sum(seen[1:] * seen[:-1], axis=1)
-    return float(_overlay_error_deg(fused, true).max()), float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max())
+    return float(overlay_error_deg(fused, true).max()), float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).max())
 
 
 def _direction_deg(direction: Float64Array) -> Float64Array:
     """Return heading and elevation, deg[n, 2]."""
     east, north, up = direction.T
     return np.asarray(np.degrees(np.stack([np.arctan2(east, north), np.arcsin(np.clip(up, -1, 1))], axis=1)))
+
+
+def heading_of(direction: Float64Array) -> Float64Array:
+    """Return headings, rad[n]."""
+    return np.arctan2(direction[:, 0], direction[:, 1])
+
+
+def turn_about_up(quaternions: Float64Array, angle: float) -> Float64Array:
+    """Return orientations turned about the zenith, anticlockwise from above."""
+    turn = np.array([[0.0, 0.0, math.sin(0.5 * angle), math.cos(0.5 * angle)]])
+    return _multiply(np.broadcast_to(turn, quaternions.shape), quaternions)
 
 
 def _of_rotation_vector(v: Float64Array) -> Float64Array:
@@ -265,7 +279,8 @@ def _multiply(a: Float64Array, b: Float64Array) -> Float64Array:
     return np.concatenate([aw * bv + bw * av + np.cross(av, bv), aw * bw - np.sum(av * bv, 1, keepdims=True)], axis=1)
 
 
-def _pixels(degrees: float, fov_deg: float) -> str:
+def pixels(degrees: float, fov_deg: float) -> str:
+    """Return an angle from the middle of the screen in pixels, in parentheses."""
     if degrees > 60:
         return "(off)"
     focal = 0.5 * _SCREEN_PX / math.tan(math.radians(fov_deg / 2))
