@@ -4,8 +4,8 @@
 
 - killed: from SIGKILL of the daemon to the banner that says so; and from the moment a new daemon is ready to poses on
   the page again, without a reload.
-- stopped: the page's process is stopped with SIGSTOP and goes on after some seconds; from then to the newest pose on the
-  page, and what the daemon's figures did meanwhile, beside what they did in as long a time before.
+- stopped: the page's process is stopped with SIGSTOP and goes on after some seconds; from then to the newest pose on
+  it, and what the daemon's figures did meanwhile, beside what they did in as long a time before.
 """
 
 import argparse
