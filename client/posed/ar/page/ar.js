@@ -72,6 +72,7 @@ const live = new Live("/live", {
   opened: () => askForTruth(),
   closed: async (wasOpen) => {
     scene.link = { state: "SERVER_LOST", reason: "" };
+    read();
     if (!wasOpen && (await isRefused())) scene.link = { state: "REFUSED", reason: "" };
   },
   on: {
@@ -138,7 +139,8 @@ async function isRefused() {
 /** Bring the figures, the banner and what is spoken up to date. */
 function read() {
   const now = performance.now();
-  const isStale = scene.isStale(now);
+  const isLost = scene.link.state !== "CONNECTED" && scene.link.state !== "CONNECTING";
+  const isStale = isLost || scene.isStale(now);
   overlay.classList.toggle("stale", isStale);
   readout.showBanner(isStale && now > PATIENCE_MS ? scene.link : null, now - scene.poseAt);
   const { pose, chosen } = scene;
@@ -151,17 +153,25 @@ function read() {
       ageMs: ageWhenDrawnMs,
       delayMs: publishedToDrawnMs,
       registration: frame.registration,
-      truthNote: frame.truthNote,
+      truthNote: isStale ? "stale" : frame.truthNote,
       correction: scene.describeCorrection(),
       script: pace.script(),
     },
     chosen.unit,
   );
-  readout.showTarget(target.place, frame.sight, target.isHeld, chosen.unit);
+  readout.showTarget(target.place, frame.sight, target.isHeld, chosen.unit, withoutTarget());
   for (const button of modeButtons) {
     button.setAttribute("aria-pressed", `${button.dataset.mode === pose?.m}`);
   }
   if (pose !== null) readout.sayTarget(isStale ? "No pose arrives." : targetInWords(), now);
+}
+
+function withoutTarget() {
+  if (scene.position === null) {
+    return { name: "Position unknown", note: "Start posed ar with --position, or enter one under Correct." };
+  }
+  if (scene.places.isEmpty) return { name: "No places", note: "Start posed ar with --places FILE." };
+  return { name: "No target under the cross", note: "" };
 }
 
 function targetInWords() {
@@ -281,10 +291,7 @@ async function load() {
   const [places, given] = await Promise.all(["/places.json", "/settings.json"].map(fetchJson));
   scene.places.load(places);
   scene.settings = { ...scene.settings, ...given };
-  frame.background.panoramaMiddle = (given.panorama_heading_deg ?? 0) * DEGREE;
-  document.querySelector("#settings-form").elements.panorama.value = `${given.panorama_heading_deg ?? 0}`;
   await settings.showView(given.background ?? "world");
-  if (places.places.length === 0) tell("There are no places: start posed ar with --places FILE.");
   redraw();
 }
 

@@ -57,6 +57,8 @@ export function formatDistance(metres) {
   return `${kilometres.toFixed(kilometres < 10 ? 2 : kilometres < 100 ? 1 : 0)} km`;
 }
 
+// Reads on a label that is drawn with a quarter of the bright sky in it.
+const DETAIL = "#dde3ea";
 const LABEL_HEIGHT = 22;
 const MOST_LABELS = 400;
 // Of the screen's width; a phone is to show more than one name.
@@ -127,7 +129,7 @@ function drawLabel(name, detail, isTarget, scale, longest) {
   context.fillText(shown, nameX, LABEL_HEIGHT / 2 + 0.5);
   context.direction = "ltr";
   context.font = detailFont;
-  context.fillStyle = isTarget ? WHITE : QUIET;
+  context.fillStyle = isTarget ? WHITE : DETAIL;
   context.fillText(detail, detailX, LABEL_HEIGHT / 2 + 0.5);
   return { canvas, width, height: LABEL_HEIGHT };
 }

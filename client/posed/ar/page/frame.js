@@ -14,7 +14,6 @@ const NO_SIGHT = { bearing: NaN, elevation: NaN, distance: NaN };
 // A thousandth of a pixel: what has turned or moved by less looks the same.
 const SAME_TURN = 1e-6;
 const SAME_PLACE_M = 1e-3;
-const LEFT_OF_LABELS = 72;
 const MARGIN = 8;
 
 export class Frame {
@@ -31,7 +30,7 @@ export class Frame {
     this.overlay = new Overlay(this._context, this.projector);
     this._instruments = new Instruments(this._context);
     this._thumbnail = new Thumbnail(document.querySelector("#thumbnail"));
-    this._free = { left: LEFT_OF_LABELS, top: 0, right: 0, bottom: 0 };
+    this._free = Instruments.freeOf(0, 0);
     this._seen = { q: [0, 0, 0, 0], eye: [0, 0, 0] };
     this._scale = 1;
     this._isForced = true;
@@ -153,7 +152,7 @@ function attitudeOf({ axes, pitchSine, upX, upY }) {
 
 /** Where labels may be: between the instruments at the top and what lies at the foot or the side. */
 function freeSpace(width, height) {
-  const free = { left: LEFT_OF_LABELS, top: Instruments.bottomOf(height), right: width - MARGIN, bottom: height - MARGIN };
+  const free = Instruments.freeOf(width, height);
   for (const element of document.querySelectorAll("#thumbnail, #target, #readout, #modes, .panel")) {
     const box = element.getBoundingClientRect();
     if (box.width === 0) continue;

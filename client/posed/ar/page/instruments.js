@@ -10,6 +10,8 @@ const WIDEST_TAPE = 540;
 const VALUE_HEIGHT = 24;
 const TOP_OF_ROLL = TAPE_TOP + TAPE_HEIGHT + VALUE_HEIGHT + 20;
 const ROLL_HEIGHT = 52;
+const MARGIN = 8;
+// On its side a phone has the thumbnail where the pitch scale would be.
 const LOW = 560;
 const ROLL_RADIUS = 150;
 const ROLL_REACH = 40;
@@ -29,9 +31,16 @@ export class Instruments {
     this._context = context;
   }
 
-  /** Where the instruments of the top end, CSS pixels; on a low screen labels may lie about the roll scale. */
-  static bottomOf(screenHeight) {
-    return screenHeight < LOW ? TOP_OF_ROLL : TOP_OF_ROLL + ROLL_HEIGHT;
+  /** What the instruments at the edges of a screen leave free: {left, top, right, bottom}, CSS pixels. */
+  static freeOf(width, height) {
+    const pitch = PITCH_WIDTH + 26;
+    const isLow = height < LOW;
+    return {
+      left: isLow ? MARGIN : pitch,
+      top: TOP_OF_ROLL + ROLL_HEIGHT,
+      right: width - (isLow ? pitch : MARGIN),
+      bottom: height - MARGIN,
+    };
   }
 
   /**
@@ -73,6 +82,9 @@ export class Instruments {
       context.fillRect(x - 0.75, TAPE_TOP + TAPE_HEIGHT - (isLabelled ? 10 : 6), 1.5, isLabelled ? 10 : 6);
       const name = NAMES[(onCircle * 360) / circle];
       if (!isLabelled && name === undefined) continue;
+      // NW stands between 310 and 320: where it is narrow, in their place.
+      const isCrowded = perPart * small < 32 && name === undefined;
+      if (isCrowded && (NAMES[onCircle - small] ?? NAMES[onCircle + small]) !== undefined && circle === 360) continue;
       context.fillStyle = WHITE;
       context.font = name === undefined ? TICK_FONT : NAME_FONT;
       context.fillText(name ?? `${onCircle}`, x, TAPE_TOP + 13);
@@ -173,7 +185,7 @@ export class Instruments {
   _drawPitch(pitch, camera) {
     const context = this._context;
     const isLow = camera.height < LOW;
-    const half = Math.min(110, camera.height * 0.19);
+    const half = Math.min(110, camera.height * 0.125);
     const x = isLow ? camera.width - PITCH_WIDTH - 10 : 10;
     const y = camera.height / 2;
     const shown = pitch / DEGREE;

@@ -12,6 +12,9 @@ const HIT_RADIUS = 22;
 const EDGE = 18;
 const EDGE_SLOTS = 7;
 const CROSS_PX = 30;
+// Fainter, the text of a label over a bright sky would be below a contrast of 4.5.
+const FAINTEST_LABEL = 0.75;
+const FAINTEST_LINE = 0.5;
 
 /**
  * @typedef {Object} Drawn
@@ -103,7 +106,7 @@ export class Overlay {
       if (place.kind === "point") continue;
       context.beginPath();
       for (const ring of place.rings) this._to.trace(context, ring);
-      context.globalAlpha = fade(place.distance);
+      context.globalAlpha = fade(place.distance, FAINTEST_LINE);
       strokeOutlined(context, RED, place === target ? 3 : 2);
     }
     context.globalAlpha = 1;
@@ -142,7 +145,7 @@ export class Overlay {
     for (let i = 0; i < this.drawn.length && labels.length < MOST_LABELS; i++) {
       const dot = this.drawn[i];
       const place = places.all[i];
-      if (!dot.visible || (place !== target && !isInside(dot, free))) continue;
+      if (!dot.visible || !isInside(dot, free)) continue;
       const picture = this._labels.get(place.name, formatDistance(this._distance(place)), place === target);
       labels.push({
         id: place.id,
@@ -153,7 +156,7 @@ export class Overlay {
         priority: place === target ? Infinity : -place.distance,
         anchorX: dot.x,
         anchorY: dot.y,
-        alpha: place === target ? 1 : fade(place.distance),
+        alpha: place === target ? 1 : fade(place.distance, FAINTEST_LABEL),
         picture: picture.canvas,
         hidden: false,
       });
@@ -185,9 +188,8 @@ export class Overlay {
   /** Arrows at the edge: to the target wherever it is, to the nearest others that are not behind. */
   _drawArrows(places, target, free) {
     this._takenAtEdge.length = 0;
-    if (target !== null && !this.drawn.find((dot) => dot.id === target.id)?.visible) {
-      this._drawArrow(target, true, free);
-    }
+    const held = target === null ? undefined : this.drawn.find((dot) => dot.id === target.id);
+    if (held !== undefined && !(held.visible && isInside(held, free))) this._drawArrow(target, true, free);
     let left = ARROWS;
     for (let i = 0; i < this.drawn.length && left > 0; i++) {
       const place = places.all[i];
@@ -273,10 +275,10 @@ function clamp(value, low, high) {
   return Math.min(Math.max(value, low), Math.max(low, high));
 }
 
-/** Opacity by distance: full to 300 m, half from 50 km on. */
-export function fade(metres) {
+/** Opacity by distance: full to 300 m, the faintest from 50 km on. */
+function fade(metres, faintest) {
   const decades = Math.log10(Math.max(metres, 300) / 300) / Math.log10(50_000 / 300);
-  return 1 - 0.5 * Math.min(decades, 1);
+  return 1 - (1 - faintest) * Math.min(decades, 1);
 }
 
 function isInside({ x, y }, { left, top, right, bottom }) {

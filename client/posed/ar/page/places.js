@@ -39,6 +39,10 @@ export class Places {
     this.origin = null;
   }
 
+  get isEmpty() {
+    return this._raw.length === 0;
+  }
+
   byId(id) {
     return this.all.find((place) => place.id === id) ?? null;
   }

@@ -64,16 +64,20 @@ export class Readout {
     this.write("r-mode", pose.m);
     this.write("r-accuracy", accuracy);
     this.write("r-state", isStale ? "stale" : statusText(pose.s), isStale || (pose.s & WORRYING) !== 0);
-    this.write("brief", `${rate} · ${age} · ${accuracy}\n${truthNote === null ? `error ${error}` : truthNote}`);
+    const below = isStale ? "waiting for a pose" : (truthNote ?? `error ${error}`);
+    this.write("brief", `${rate} · ${age} · ${accuracy}\n${below}`);
   }
 
-  /** @param {?import("./places.js").Place} target  @param {{bearing:number, elevation:number, distance:number}} sight */
-  showTarget(target, sight, isHeld, unit) {
+  /**
+   * @param {?import("./places.js").Place} target  @param {{bearing:number, elevation:number, distance:number}} sight
+   * @param {{name:string, note:string}} otherwise  shown where there is no target
+   */
+  showTarget(target, sight, isHeld, unit, otherwise) {
     const digits = unit === "dms" ? 0 : 2;
     document.getElementById("target").classList.toggle("none", target === null);
     document.getElementById("target-clear").hidden = !isHeld;
-    this.write("target-name", target?.name ?? "No target under the cross");
-    this.write("target-note", target?.note ?? "");
+    this.write("target-name", (target ?? otherwise).name);
+    this.write("target-note", (target ?? otherwise).note);
     this.write("target-bearing", formatBearing(sight.bearing, unit, digits));
     this.write("target-elevation", format(sight.elevation, unit, digits));
     this.write("target-distance", target === null ? "–" : formatDistance(sight.distance));
@@ -129,6 +133,8 @@ function statusText(bits) {
 }
 
 function milliseconds(value) {
+  // The clocks of browser and daemon are compared to some milliseconds.
+  if (value < 1) return "< 1 ms";
   return Number.isFinite(value) ? `${value.toFixed(value < 10 ? 1 : 0)} ms` : "–";
 }
 

@@ -40,6 +40,8 @@ export class Scene {
   takePose(pose, at) {
     if (this._frozen === null) this.pose = pose;
     else this._frozen.pose = pose;
+    // A pause is no measure of the pace.
+    if (this.isStale(at)) this.forgetPace();
     this.poseAt = at;
     this._arrivals[this._arrived++ % PACE_KEPT] = at;
   }
@@ -82,7 +84,7 @@ export class Scene {
     return ((n - 1) * 1000) / (this.poseAt - oldest);
   }
 
-  /** Forget the pace: after a pause the gap is no measure of it. */
+  /** Begin to measure the pace anew. */
   forgetPace() {
     this._arrived = 0;
   }

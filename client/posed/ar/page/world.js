@@ -233,10 +233,6 @@ export class World {
     const to = this._to;
     const cosine = -to.upY * scale;
     const sine = to.upX * scale;
-    context.textAlign = "center";
-    context.textBaseline = "top";
-    context.lineWidth = 1.5;
-    context.strokeStyle = "rgba(255, 255, 255, 0.9)";
     for (let i = 0; i < 72; i++) {
       const bar = this._bars[i];
       if (!to.direction(bar.e, bar.n, 0) || !to.isOnScreen(30)) continue;
@@ -244,17 +240,38 @@ export class World {
       context.fillStyle = "rgba(255, 255, 255, 0.9)";
       context.fillRect(-0.75, 0, 1.5, i % 3 === 0 ? 9 : 5);
       if (i % 3 !== 0) continue;
-      const isNamed = i % 9 === 0;
-      context.font = isNamed ? NAME_FONT : BEARING_FONT;
-      context.lineWidth = 3;
-      context.strokeStyle = "rgba(20, 26, 16, 0.6)";
-      context.strokeText(bar.text, 0, 12);
-      context.fillText(bar.text, 0, 12);
+      const { canvas, width, height } = this._textOf(bar, scale);
+      context.drawImage(canvas, -width / 2, 10, width, height);
     }
     context.setTransform(scale, 0, 0, scale, 0, 0);
   }
+
+  /** The text of a bearing, drawn once: stroked text costs more than all else in a frame. */
+  _textOf(bar, scale) {
+    if (bar.scale === scale) return bar.picture;
+    const canvas = document.createElement("canvas");
+    const width = TEXT_WIDTH;
+    const height = TEXT_HEIGHT;
+    canvas.width = width * scale;
+    canvas.height = height * scale;
+    const context = canvas.getContext("2d");
+    context.scale(scale, scale);
+    context.textAlign = "center";
+    context.textBaseline = "top";
+    context.font = bar.isNamed ? NAME_FONT : BEARING_FONT;
+    context.lineWidth = 3;
+    context.strokeStyle = "rgba(20, 26, 16, 0.6)";
+    context.strokeText(bar.text, width / 2, 2);
+    context.fillStyle = "rgba(255, 255, 255, 0.9)";
+    context.fillText(bar.text, width / 2, 2);
+    bar.picture = { canvas, width, height };
+    bar.scale = scale;
+    return bar.picture;
+  }
 }
 
+const TEXT_WIDTH = 44;
+const TEXT_HEIGHT = 28;
 const NAME_FONT = font(19, 700);
 const BEARING_FONT = font(12);
 
@@ -262,7 +279,9 @@ function makeBearings() {
   const bars = [];
   for (let i = 0; i < 72; i++) {
     const bearing = i * 5 * DEGREE;
-    bars.push({ e: Math.sin(bearing), n: Math.cos(bearing), text: i % 9 === 0 ? NAMES[i / 9] : `${i * 5}` });
+    const isNamed = i % 9 === 0;
+    const text = isNamed ? NAMES[i / 9] : `${i * 5}`;
+    bars.push({ e: Math.sin(bearing), n: Math.cos(bearing), isNamed, text, scale: 0, picture: null });
   }
   return bars;
 }
