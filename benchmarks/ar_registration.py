@@ -12,8 +12,10 @@ it is. Twice:
 
 import argparse
 import sys
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from ar_experiments import MODES, camera_axis, heading_of, overlay_error_deg, pixels, turn_about_up
@@ -102,11 +104,19 @@ def seen(trial: Path) -> Float64Array:
     with (
         open_browser() as browser,
         PrivateDaemon([f"--source=replay:{trial}"]) as daemon,
-        ar_page(browser, daemon, "--mode=GAME") as page,
+        tempfile.NamedTemporaryFile("w", suffix=".geojson") as places,
+        ar_page(browser, daemon, "--mode=GAME", f"--places={_no_places(places)}") as page,
     ):
         page.evaluate(_READ)
         page.wait_for_timeout(1000 * (seconds - 2.0))
         return np.array(page.evaluate("() => errors"), np.float64)
+
+
+def _no_places(file: IO[str]) -> str:
+    """Have no place in the file, so that the page measures in the middle of the view; return its name."""
+    file.write('{"type": "FeatureCollection", "features": []}')
+    file.flush()
+    return file.name
 
 
 def _cell(errors: Iterable[float], fov_deg: float) -> str:
