@@ -100,7 +100,10 @@ _READ = """() => {
 def seen(trial: Path) -> Float64Array:
     """Return the errors (deg) that the page showed at each frame of a replay."""
     recording = load_recording(trial)
-    seconds = (recording.end_ns - recording.start_ns) / 1e9
+    if recording.truth is None:
+        sys.exit(f"{recording.name} has no truth")
+    # Poses are counted from the first sample on, ten a second; motion capture ends before the phone does.
+    last = (int(recording.truth.timestamp_ns[-1]) - recording.start_ns) // 100_000_000 - 5
     with (
         open_browser() as browser,
         PrivateDaemon([f"--source=replay:{trial}"]) as daemon,
@@ -108,7 +111,7 @@ def seen(trial: Path) -> Float64Array:
         ar_page(browser, daemon, "--mode=GAME", f"--places={_no_places(places)}") as page,
     ):
         page.evaluate(_READ)
-        page.wait_for_timeout(1000 * (seconds - 2.0))
+        page.wait_for_function("last => posedAr.pose.sequence >= last", arg=last, polling=50, timeout=300_000)
         return np.array(page.evaluate("() => errors"), np.float64)
 
 
