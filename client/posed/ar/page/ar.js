@@ -8,7 +8,7 @@
  * pose          {sequence, rateMode, headingAccuracyDeg, status, missed, isStale, hz} | null
  * camera        {width, height, fovDeg, rotation, f}; pixels, degrees
  * attitude      {heading, pitch, roll} of the camera by the corrected pose, degrees, true north
- * registration  {deg, px} at the target, else in the middle of the screen; NaN without a truth
+ * registration  {deg, px} at the target if it is on the screen, else in the middle; NaN without a truth
  * delay         {publishedToDrawnMs, ageWhenDrawnMs, clockErrorMs} of the newest pose
  * script        {p50, p95, frames}: ms a frame took, of the last 240; frames drawn since the page was opened
  * link          {state, reason} of the way to the daemon

@@ -4,7 +4,7 @@ const byPose = new Float64Array(3);
 const byTruth = new Float64Array(3);
 
 /**
- * The error at the target, or where the camera truly points if there is none.
+ * The error at the target, or where the camera truly points if there is none on the screen.
  *
  * @param {import("./projector.js").Projector} overlay  aimed by the fused pose
  * @param {import("./projector.js").Projector} world  aimed by the truth
@@ -12,7 +12,7 @@ const byTruth = new Float64Array(3);
  * @param {{deg:number, px:number}} into  px is NaN if either is not ahead of the camera
  */
 export function measure(overlay, world, target, into) {
-  if (target !== null) {
+  if (target !== null && isOnScreen(world, target.anchor)) {
     const [e, n, u] = target.anchor;
     overlay.inCamera(e, n, u, byPose);
     world.inCamera(e, n, u, byTruth);
@@ -29,4 +29,8 @@ export function measure(overlay, world, target, into) {
   const f = world.camera.f;
   into.px = c > 0 && z > 0 ? f * Math.hypot(a / c - x / z, b / c - y / z) : NaN;
   return into;
+}
+
+function isOnScreen(world, [e, n, u]) {
+  return world.point(e, n, u) && world.isOnScreen();
 }

@@ -157,6 +157,11 @@ export class Scene {
     return parts.join(", ");
   }
 
+  /** Whether the truth is too old to go on from, and so stands still. */
+  truthIsLate(bootMs) {
+    return this.truth !== null && bootMs - this.truth.t > 1000 * LONGEST_TRUTH_STEP_S;
+  }
+
   /** Fit the camera to a window of so many CSS pixels. */
   fitCamera(width, height) {
     const fov = this.chosen.fovDeg ?? this.device.fov_deg;

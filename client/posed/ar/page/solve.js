@@ -9,6 +9,8 @@ const SIGMA = 0.3 * DEGREE;
 // Nearer to the zenith a bearing says little of the heading.
 const STEEPEST = 75 * DEGREE;
 const CLOSEST_BEARINGS = 10 * DEGREE;
+// Any receiver tells a position better than this.
+const WORST_M = 50;
 const ROUNDS = 40;
 const DONE_M = 1e-4;
 
@@ -71,7 +73,7 @@ export function solveHeading(alignments, eye) {
  */
 export function solveBoth(alignments, start) {
   const heights = alignments.filter(({ position }) => position.height !== null).length;
-  if (alignments.length < 2 || alignments.length + heights < 4) {
+  if (alignments.length < 3 && heights < 2) {
     throw new SolveError("Heading and position need three aligned places, or two whose heights are known.");
   }
   requireLevel(alignments);
@@ -105,7 +107,7 @@ export function solveBoth(alignments, start) {
   const nearest = Math.min(...distances);
   const positionSigma = covariance === null ? Infinity : SIGMA * Math.sqrt(covariance[1][1] + covariance[2][2]);
   // Beyond a tenth of the nearest distance the equations are no more the straight ones that the sigma is from.
-  if (!(positionSigma < nearest / 10)) throw new SolveError(badGeometry(alignments, start, positionSigma));
+  if (!(positionSigma < Math.min(nearest / 10, WORST_M))) throw new SolveError(badGeometry(alignments, start, positionSigma));
   if (Math.hypot(...moved) > 5 * Math.max(...distances)) throw new SolveError(badGeometry(alignments, start));
   return {
     headingOffset: offset,
