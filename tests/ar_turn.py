@@ -35,10 +35,12 @@ class Step:
 class SteppedFeed(SilentFeed):
     """A feed that moves on when it is told to, and says the same again meanwhile, as the page takes silence ill."""
 
-    def __init__(self, steps: Sequence[Step]) -> None:
+    def __init__(self, steps: Sequence[Step], *, has_truth: bool = True) -> None:
         super().__init__()
         self.steps = steps
+        self._has_truth = has_truth
         self._shown: tuple[dict[str, Any], dict[str, Any]] | None = None
+        self._repeats = 0
         self._ended = threading.Event()
         self._repeating = threading.Thread(target=self._repeat)
 
@@ -66,8 +68,11 @@ class SteppedFeed(SilentFeed):
     def _publish_shown(self) -> None:
         if self._shown is not None:
             truth, pose = self._shown
-            self.publish("t", truth)
-            self.publish("p", pose)
+            if self._has_truth:
+                self.publish("t", truth)
+            # The same value twice would be sent but once.
+            self._repeats += 1
+            self.publish("p", {**pose, "f": self._repeats})
 
 
 def faithful(steps: Sequence[Step], number: int) -> dict[str, Any]:
