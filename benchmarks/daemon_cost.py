@@ -56,7 +56,7 @@ def _cost(recording: Path, seconds: float, repeats: int) -> list[Figure]:
 
     def run(name: str, daemon: Daemon, client: Workload) -> None:
         with client:
-            runs.setdefault(name, []).extend(observe([daemon], seconds, client))
+            runs.setdefault(name, []).extend(observe([daemon], seconds, client.read))
             results.setdefault(name, []).append(client.result())
 
     with (

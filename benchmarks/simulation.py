@@ -8,9 +8,9 @@ import numpy as np
 from posed.clock import VirtualClock
 from posed.events import EventColumn, Float64Array, Int64Array, Pose, RateMode, SensorType
 from posed.fusion.filter import OrientationFilter
-from posed.hal import open_source
+from posed.hal.motion import MotionScript, make_script
 from posed.hal.profile import load_profile
-from posed.hal.source import SensorSource
+from posed.hal.simulated import SimulatedPhone
 from posed.sensors import SensorService
 
 
@@ -21,7 +21,7 @@ class Simulation:
     poses: list[Pose]
     accelerometer: EventColumn
     magnetometer: EventColumn
-    source: SensorSource
+    source: SimulatedPhone
 
     @property
     def quaternions(self) -> Float64Array:
@@ -46,7 +46,7 @@ class Simulation:
 
 
 def simulate(
-    script: str,
+    script: str | MotionScript,
     seconds: float,
     make_filter: Callable[[], OrientationFilter],
     mode: RateMode = RateMode.FASTEST,
@@ -56,7 +56,8 @@ def simulate(
 ) -> Simulation:
     """Put the simulated tablet of the paper through a script and fuse it; the warm-up is left out of what is kept."""
     clock = VirtualClock(1_000_000_000)
-    source = open_source(f"sim:{script}", load_profile("patonis2018"), clock, seed=seed)
+    motion = make_script(script, seed) if isinstance(script, str) else script
+    source = SimulatedPhone(load_profile("patonis2018"), clock, motion, seed)
     service = SensorService(source, make_filter(), clock)
     listener = service.connect()
     service.register_pose("benchmark", 100_000, mode.sampling_period_us)

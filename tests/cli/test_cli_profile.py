@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -92,6 +93,7 @@ def test_the_paper_s_table_is_the_modes_of_android() -> None:
 def test_there_is_a_step_a_run_and_one_for_idle() -> None:
     assert steps(modes=4, repeats=5) == 5 * 13
     assert steps(modes=4, repeats=5, command=["client"]) == 5 * 5
+    assert steps(modes=4, repeats=5, with_ar=True) == 5 * 17
 
 
 def _observation(cpu: float, *, source: float = 0.0, client: float | None = None) -> Observation:
@@ -166,7 +168,12 @@ def test_the_json_has_the_figures_and_their_spreads(two_modes: Report) -> None:
         "rss_mb",
         "lateness_p50_ms",
         "lateness_p99_ms",
+        "ar_cpu_percent",
+        "ar_daemon_cpu_percent",
+        "ar_server_cpu_percent",
+        "ar_page_cpu_percent",
     }
+    assert found["modes"]["GAME"]["ar_cpu_percent"] is None
     assert spread["daemon_cpu_percent"] == 0.5
     assert found["modes"]["GAME"]["sensor_hz"]["accelerometer"] == {"asked": 50.0, "configured": 50.0, "measured": 50.0}
     assert set(found["machine"]) == {"cpu_model", "cores", "kernel", "python", "libzmq", "protobuf"}
@@ -176,6 +183,21 @@ def test_the_table_marks_what_does_not_differ(two_modes: Report) -> None:
     cells = {row[0]: row[1:] for row in table.rows(two_modes)}
     assert cells["daemon CPU %"] == ["1.25 (0.50)", "~ 1.50 (0.50)"]
     assert cells["- the paper's"] == ["45", "150"]
+
+
+def test_the_ar_application_is_the_sum_of_its_parts() -> None:
+    runs = _runs("GAME", (1.5, 1.75, 2.0))
+    runs.ar = [replace(_observation(2.25, client=1.5), page=Usage(page, 30.0, 300.0)) for page in (20.0, 21.0, 25.0)]
+    made = report({"GAME": runs})
+    game = made.modes["GAME"]
+    assert game.ar_daemon_cpu_percent == Repeated(2.0, 0.0)
+    assert game.ar_server_cpu_percent == Repeated(1.5, 0.0)
+    assert game.ar_page_cpu_percent == Repeated(21.0, 5.0)
+    assert game.ar_cpu_percent == Repeated(24.5, 5.0)
+    cells = {row[0]: row[1:] for row in table.rows(made)}
+    assert cells["AR application CPU %"] == ["24.5 (5.0)"]
+    assert cells["the paper's CPU %"] == ["13"]
+    assert any("headless Chromium" in note for note in table.notes(made))
 
 
 def test_the_notes_say_which_mode_was_in_force(two_modes: Report) -> None:
@@ -249,6 +271,24 @@ def test_a_mode_is_measured(tmp_path: Path) -> None:
     assert [hz["measured"] for hz in game["sensor_hz"].values()] == pytest.approx([50.0] * 3, abs=0.5)
     assert 0 < game["source_cpu_percent"] + game["kernel_cpu_percent"] < game["daemon_cpu_percent"]
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_ar_application_is_measured(tmp_path: Path, browser_path: str) -> None:
+    done = _profile(tmp_path, "--modes", "game", "--with-ar", "--json")
+    assert done.stderr == ""
+    game = json.loads(done.stdout)["modes"]["GAME"]
+    parts = [game[f"ar_{part}cpu_percent"] for part in ("daemon_", "server_", "page_")]
+    assert min(parts) > 0
+    assert game["ar_cpu_percent"] == pytest.approx(sum(parts), abs=1e-3)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_browser_the_ar_application_is_refused_before_anything_is_measured(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert main(["profile", "--with-ar"]) == 1
+    assert "needs a browser, one of chromium, chromium-browser, google-chrome" in capsys.readouterr().err
 
 
 _CLIENT = """\

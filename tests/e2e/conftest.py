@@ -8,9 +8,7 @@ import socket
 import subprocess
 import sys
 import tempfile
-import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -94,17 +92,3 @@ def desk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     yield made
     made.clear()
-
-
-@pytest.fixture
-def eventually() -> Callable[[Callable[[], object]], None]:
-    """Wait until something that gives no event of its own is so."""
-
-    def wait(condition: Callable[[], object]) -> None:
-        pause = threading.Event()
-        deadline = time.monotonic() + _PATIENCE_S
-        while not condition():
-            assert time.monotonic() < deadline, "it never came to be"
-            pause.wait(0.01)
-
-    return wait

@@ -25,7 +25,9 @@ _ALLOWED = {
     "evaluation": _LEAVES | {"hal", "sensors", "fusion"},
     "daemon": _LEAVES | {"hal", "sensors", "fusion", "binder", "proto"},
     "client": {"errors", "binder", "proto"},
-    "cli": _LEAVES | {"hal", "sensors", "fusion", "evaluation", "daemon", "client", "binder", "proto"},
+    "web": {"errors"},
+    "ar": {"errors", "client", "web"},
+    "cli": _LEAVES | {"hal", "sensors", "fusion", "evaluation", "daemon", "client", "binder", "proto", "web", "ar"},
 }
 _WITHOUT_ZMQ = {"errors", "version", "proto", "events", "clock", "hal", "fusion", "sensors", "evaluation"}
 

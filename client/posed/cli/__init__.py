@@ -28,6 +28,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "events": ("posed.cli.events", "print a sensor's events as they come"),
     "fuse": ("posed.cli.fuse", "turn a recording into poses, without a daemon"),
     "evaluate": ("posed.cli.evaluate", "compare filters on recordings with truth"),
+    "ar": ("posed.cli.ar", "open the AR page: georeferenced places held in place by the pose"),
     "profile": ("posed.cli.profile", "measure the CPU that each rate mode costs"),
 }
 

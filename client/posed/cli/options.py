@@ -26,7 +26,7 @@ def add_daemon_options(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--loop", action="store_true", help="begin a replay again when it ends")
     group.add_argument(
         "--position",
-        type=_position,
+        type=position,
         metavar="LAT,LON,HEIGHT",
         help="where the phone is: degrees and metres above the ellipsoid (south of the equator: --position=-33.9,...)",
     )
@@ -114,6 +114,16 @@ def positive_seconds(text: str) -> float:
     return seconds
 
 
+def position(text: str) -> tuple[float, float, float]:
+    """Read a latitude, a longitude (degrees) and a height (m)."""
+    parts = [_number(part) for part in text.split(",")]
+    if len(parts) != 3 or not (abs(parts[0]) <= 90 and abs(parts[1]) <= 180 and math.isfinite(parts[2])):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no position; give LAT,LON,HEIGHT: -90 to 90 and -180 to 180 degrees, metres"
+        )
+    return parts[0], parts[1], parts[2]
+
+
 def _pose_rate(text: str) -> float:
     rate = _number(text)
     if not 1 <= rate <= 200:
@@ -133,15 +143,6 @@ def _profile(text: str) -> str:
 def _absolute(path: str) -> str:
     # A shell expands ~ only at the start of a word, not behind `replay:`.
     return os.path.abspath(os.path.expanduser(path))
-
-
-def _position(text: str) -> tuple[float, float, float]:
-    parts = [_number(part) for part in text.split(",")]
-    if len(parts) != 3 or not (abs(parts[0]) <= 90 and abs(parts[1]) <= 180 and math.isfinite(parts[2])):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no position; give LAT,LON,HEIGHT: -90 to 90 and -180 to 180 degrees, metres"
-        )
-    return parts[0], parts[1], parts[2]
 
 
 def _number(text: str) -> float:

@@ -37,6 +37,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--repeats", type=positive_count, default=5, metavar="N", help="runs of each mode and kind (default: 5)"
     )
     parser.add_argument("--attach", action="store_true", help="measure the running daemon instead of one a mode")
+    parser.add_argument(
+        "--with-ar", action="store_true", help="measure posed ar too, with its page in a headless Chromium"
+    )
     shown = parser.add_argument_group("output")
     shown.add_argument("--json", nargs="?", const="-", metavar="FILE", help="write JSON, to stdout without FILE")
     shown.add_argument("--markdown", action="store_true", help="print Markdown instead of a table for the terminal")
@@ -66,6 +69,10 @@ def run(arguments: argparse.Namespace) -> int:
         from posed.cli.profiling.plot import require_matplotlib
 
         require_matplotlib()
+    if arguments.with_ar:
+        from posed.cli.profiling.ar_client import find_browser
+
+        find_browser()
     _show(_measure(arguments, options), arguments)
     return 0
 
@@ -75,9 +82,9 @@ def _measure(arguments: argparse.Namespace, options: dict[str, Any]) -> "Report"
     from posed.cli.profiling.report import report
 
     with _daemons(arguments, options) as daemons:
-        count = steps(len(daemons), arguments.repeats, arguments.command)
-        with _progress(count) as progress:
-            runs = measure(daemons, arguments.seconds, arguments.repeats, arguments.command, progress)
+        wanted = {"with_ar": arguments.with_ar}
+        with _progress(steps(len(daemons), arguments.repeats, arguments.command, **wanted)) as progress:
+            runs = measure(daemons, arguments.seconds, arguments.repeats, arguments.command, progress, **wanted)
     return report(runs)
 
 

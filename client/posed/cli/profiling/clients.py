@@ -194,16 +194,21 @@ class Command:
             )
 
     def _end(self) -> None:
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            for pid in session_members(self._process.pid):
-                with contextlib.suppress(ProcessLookupError):
-                    os.kill(pid, number)
-            deadline = time.monotonic() + _FAREWELL_S
-            while session_members(self._process.pid) and time.monotonic() < deadline:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    self._process.wait(0.05)
-        self._process.wait()
+        end_session(self._process)
         self._output.close()
+
+
+def end_session(process: "subprocess.Popen[bytes]") -> None:
+    """End every process of the session that a process leads: asked first, then made to."""
+    for number in (signal.SIGTERM, signal.SIGKILL):
+        for pid in session_members(process.pid):
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, number)
+        deadline = time.monotonic() + _FAREWELL_S
+        while session_members(process.pid) and time.monotonic() < deadline:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(0.05)
+    process.wait()
 
 
 def _last_line(output: Any) -> str:

@@ -4,7 +4,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from posed.cli.profiling.accounting import Usage, read, usage
+from posed.cli.profiling.accounting import Reading, Usage, read, usage
+from posed.cli.profiling.ar_client import ArApplication
 from posed.cli.profiling.clients import Client, Command, Received, Workload
 from posed.cli.profiling.daemons import Daemon
 from posed.client import SENSOR_DELAY_FASTEST, SENSOR_DELAY_GAME, SENSOR_DELAY_NORMAL, SENSOR_DELAY_UI
@@ -33,6 +34,8 @@ class Observation:
     events_fused_per_s: float
     statistics: sensors_pb2.Statistics
     """The daemon's counters at the end."""
+    page: Usage | None = None
+    """The browser, where the client is the AR application's server."""
 
 
 @dataclass(slots=True)
@@ -46,6 +49,7 @@ class ModeRuns:
     streaming: list[Observation] = field(default_factory=list)
     batched: list[Observation] = field(default_factory=list)
     raw: list[Received] = field(default_factory=list)
+    ar: list[Observation] = field(default_factory=list)
 
 
 def measure(
@@ -54,12 +58,14 @@ def measure(
     repeats: int,
     command: Sequence[str] = (),
     progress: Callable[[str], None] = lambda doing: None,
+    *,
+    with_ar: bool = False,
 ) -> dict[str, ModeRuns]:
     """Measure each mode with the daemon given for it; what stands beside each other alternates, repeat by repeat.
 
-    The client is a pose client of ours and then listeners to the raw sensors, or only `command`, in which {mode} is
-    replaced by the mode's name. progress is told of each of the `steps` before it begins. Raises PosedError if a
-    daemon or a client does not do what it has to.
+    The client is a pose client of ours, the AR application if asked for, and then listeners to the raw sensors; or only
+    `command`, in which {mode} is replaced by the mode's name, and the AR application. progress is told of each of the
+    `steps` before it begins. Raises PosedError if a daemon or a client does not do what it has to.
     """
     results = {mode: ModeRuns(daemon.sensor_names) for mode, daemon in daemons.items()}
     # Two modes may share a daemon, the user's own.
@@ -77,6 +83,11 @@ def measure(
             else:
                 client = Workload.poses(daemon, MODES[mode])
             _run(daemon, client, seconds, results[mode].pose, results[mode].poses)
+        if with_ar:
+            for mode, daemon in daemons.items():
+                progress(f"{repeat}/{repeats} {mode} AR")
+                with ArApplication(daemon, mode) as application:
+                    results[mode].ar += observe([daemon], seconds, application.read_server, application.read_page)
         if command:
             continue
         for kind, latency_us in (("streaming", 0), ("batched", BATCH_LATENCY_US)):
@@ -88,23 +99,23 @@ def measure(
     return results
 
 
-def steps(modes: int, repeats: int, command: Sequence[str] = ()) -> int:
+def steps(modes: int, repeats: int, command: Sequence[str] = (), *, with_ar: bool = False) -> int:
     """Return how many steps `measure` has."""
-    return repeats * (1 + modes * (1 if command else 3))
+    return repeats * (1 + modes * ((1 if command else 3) + with_ar))
 
 
-def observe(daemons: Sequence[Daemon], seconds: float, client: Client | None = None) -> list[Observation]:
-    """Watch daemons at the same time; the client, if any, belongs to the first."""
+def observe(daemons: Sequence[Daemon], seconds: float, *clients: Callable[[], Reading]) -> list[Observation]:
+    """Watch daemons at the same time; the accounts of the clients, none to two, are those of the first's."""
     first = [daemon.statistics() for daemon in daemons]
     time.sleep(_SETTLE_S)
-    client_before = client.read() if client else None
+    clients_before = [read_client() for read_client in clients]
     before = [read(daemon.pid) for daemon in daemons]
     time.sleep(seconds)
     after = [read(daemon.pid) for daemon in daemons]
-    client_used = usage(client_before, client.read()) if client and client_before else None
+    used = [usage(reading, read_client()) for reading, read_client in zip(clients_before, clients, strict=True)]
     last = [daemon.statistics() for daemon in daemons]
     return [
-        _observation(usage(*readings), client_used, *statistics)
+        _observation(usage(*readings), used, *statistics)
         for readings, statistics in zip(zip(before, after, strict=True), zip(first, last, strict=True), strict=True)
     ]
 
@@ -113,17 +124,18 @@ def _run(
     daemon: Daemon, client: Client, seconds: float, observations: list[Observation], received: list[Received]
 ) -> None:
     with client:
-        observations += observe([daemon], seconds, client)
+        observations += observe([daemon], seconds, client.read)
         received.append(client.finish())
 
 
 def _observation(
-    daemon: Usage, client: Usage | None, first: sensors_pb2.Statistics, last: sensors_pb2.Statistics
+    daemon: Usage, clients: Sequence[Usage], first: sensors_pb2.Statistics, last: sensors_pb2.Statistics
 ) -> Observation:
     elapsed_ns = last.timestamp_ns - first.timestamp_ns
     return Observation(
         daemon=daemon,
-        client=client,
+        client=clients[0] if clients else None,
+        page=clients[1] if len(clients) > 1 else None,
         source_cpu_percent=100.0 * (last.source_cpu_ns - first.source_cpu_ns) / elapsed_ns,
         filter_cpu_percent=100.0 * (last.filter_cpu_ns - first.filter_cpu_ns) / elapsed_ns,
         events_fused_per_s=1e9 * (last.events_fused - first.events_fused) / elapsed_ns,

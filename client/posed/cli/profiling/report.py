@@ -80,6 +80,11 @@ class ModeReport:
     rss_mb: Repeated
     lateness_p50_ms: float
     lateness_p99_ms: float
+    ar_daemon_cpu_percent: Repeated | None
+    ar_server_cpu_percent: Repeated | None
+    ar_page_cpu_percent: Repeated | None
+    ar_cpu_percent: Repeated | None
+    """Daemon, server and page together."""
     modes_in_force: tuple[str, ...]
     """What the poses of our client said; more or other than the mode if somebody else asked for a faster one."""
 
@@ -144,6 +149,15 @@ def _mode_report(mode: str, runs: ModeRuns) -> ModeReport:
     def daemon_cpu(observation: Observation) -> float:
         return observation.daemon.cpu_percent
 
+    def page_cpu(observation: Observation) -> float:
+        return observation.page.cpu_percent if observation.page else 0.0
+
+    def client_cpu(observation: Observation) -> float:
+        return observation.client.cpu_percent if observation.client else 0.0
+
+    def ar_cpu(observation: Observation) -> float:
+        return daemon_cpu(observation) + client_cpu(observation) + page_cpu(observation)
+
     last = runs.pose[-1].statistics
     return ModeReport(
         sensor_hz=_sensor_hz(mode, runs),
@@ -151,13 +165,17 @@ def _mode_report(mode: str, runs: ModeRuns) -> ModeReport:
         daemon_cpu_percent=above_idle(runs.pose, daemon_cpu),
         source_cpu_percent=above_idle(runs.pose, lambda one: one.source_cpu_percent),
         kernel_cpu_percent=above_idle(runs.pose, lambda one: one.filter_cpu_percent),
-        client_cpu_percent=Repeated.of(one.client.cpu_percent for one in runs.pose if one.client),
+        client_cpu_percent=Repeated.of(map(client_cpu, runs.pose)),
         streaming_cpu_percent=above_idle(runs.streaming, daemon_cpu) if runs.streaming else None,
         batched_cpu_percent=above_idle(runs.batched, daemon_cpu) if runs.batched else None,
         wakeups_per_s=Repeated.of(one.daemon.wakeups_per_s for one in runs.pose),
         rss_mb=Repeated.of(one.daemon.rss_mb for one in runs.pose),
         lateness_p50_ms=last.lateness_p50_ms,
         lateness_p99_ms=last.lateness_p99_ms,
+        ar_daemon_cpu_percent=above_idle(runs.ar, daemon_cpu) if runs.ar else None,
+        ar_server_cpu_percent=Repeated.of(map(client_cpu, runs.ar)) if runs.ar else None,
+        ar_page_cpu_percent=Repeated.of(map(page_cpu, runs.ar)) if runs.ar else None,
+        ar_cpu_percent=above_idle(runs.ar, ar_cpu) if runs.ar else None,
         modes_in_force=tuple(sorted({name for got in runs.poses for name in got.modes})),
     )
 

@@ -2,6 +2,7 @@
 
 import sys
 
+from posed.cli.profiling.ar_client import WINDOW
 from posed.cli.profiling.report import INPUTS, PAPER, ModeReport, Repeated, Report
 
 PAPER_CAPTION = (
@@ -22,6 +23,10 @@ _FIGURES = (
     ("RSS MB", "rss_mb", 1),
     ("daemon CPU %, raw batched", "batched_cpu_percent", 2),
     ("daemon CPU %, raw streamed", "streaming_cpu_percent", 2),
+    ("AR application CPU %", "ar_cpu_percent", 1),
+    ("- daemon", "ar_daemon_cpu_percent", 2),
+    ("- server", "ar_server_cpu_percent", 2),
+    ("- page", "ar_page_cpu_percent", 1),
 )
 
 
@@ -60,6 +65,12 @@ def notes(report: Report) -> list[str]:
             1,
             "raw: accelerometer, gyroscope and magnetic field instead of poses, each event as it happens (streamed) or"
             " 100 ms late at most (batched).",
+        )
+    if any(each.ar_cpu_percent for each in report.modes.values()):
+        lines.insert(
+            -2,
+            f"AR application: posed ar and its page in a headless Chromium of {WINDOW[0]} x {WINDOW[1]} pixels, all its"
+            " processes, drawing without a GPU.",
         )
     for mode, each in report.modes.items():
         if each.modes_in_force and each.modes_in_force != (mode,):
