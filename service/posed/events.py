@@ -216,7 +216,8 @@ class Pose:
     """The fused pose of one grid instant, all in sample time.
 
     sequence: index of the grid instant since the first sample. instant_ns: the grid instant. orientation.timestamp_ns:
-    newest gyroscope sample fused.
+    newest gyroscope sample fused. predicted_ns: how far the orientation was turned on past that by its angular rate, to
+    the grid instant if poses are aligned, else 0.
     """
 
     sequence: int
@@ -227,6 +228,7 @@ class Pose:
     rate_mode: RateMode
     events_fused: int
     position: Position | None = None
+    predicted_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 A subcommand's module has `add_arguments(parser)` and `run(arguments) -> int`, which returns the exit code.
 
-Exit codes: 0 done; 1 an error that one line on stderr explains; 2 usage; 3 `posed status` found no daemon; 69 the
-daemon is not there or does not answer (EX_UNAVAILABLE); 75 another daemon runs already (EX_TEMPFAIL).
+Exit codes: 0 done; 1 an error that one line on stderr explains; 2 usage; 3 `posed status` found no daemon; 65
+`posed evaluate` could not read some of the trials (EX_DATAERR); 69 the daemon is not there or does not answer
+(EX_UNAVAILABLE); 75 another daemon runs already (EX_TEMPFAIL).
 """
 
 import argparse
@@ -26,6 +27,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "sensors": ("posed.cli.sensors", "list the sensors"),
     "events": ("posed.cli.events", "print a sensor's events as they come"),
     "fuse": ("posed.cli.fuse", "turn a recording into poses, without a daemon"),
+    "evaluate": ("posed.cli.evaluate", "compare filters on recordings with truth"),
     "profile": ("posed.cli.profile", "measure the CPU that each rate mode costs"),
 }
 

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import heapq
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,28 +11,38 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from posed.cli.options import add_filter_option, add_pose_rate_option, add_profile_option, add_rate_mode_option
+from posed.cli.options import add_aligned_option, add_pose_rate_option, add_profile_option, add_rate_mode_option
 from posed.errors import InvalidArgumentError
 from posed.evaluation.fuse import fuse_recording
 from posed.events import Pose, RateMode
 from posed.hal.profile import load_profile
 from posed.hal.replay import load_recording
 
-HEADER = "sequence,timestamp_ns,qx,qy,qz,qw,wx,wy,wz,heading_accuracy_rad,status,rate_mode,events_fused,filter"
+HEADER = (
+    "sequence,timestamp_ns,qx,qy,qz,qw,wx,wy,wz,heading_accuracy_rad,status,rate_mode,events_fused,filter,predicted_ns"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recording and how to fuse it."""
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="a FILE.csv or the folder of a trial")
     add_rate_mode_option(parser)
-    add_filter_option(parser, "dcm")
+    parser.add_argument(
+        "--filter",
+        type=_filters,
+        default=("dcm",),
+        metavar="NAME,NAME",
+        help="orientation filters, one or several side by side (default: dcm)",
+    )
     add_profile_option(parser, "patonis2018")
     add_pose_rate_option(parser)
+    add_aligned_option(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="where the CSV goes (default: stdout)")
     parser.epilog = f"""\
 Columns: {HEADER.replace(",", ", ")}.
-q is device to world (east, magnetic north, up), w in rad/s in device axes, status the bits of a pose's status. The
-same recording and options give the same bytes."""
+q is device to world (east, magnetic north, up), w in rad/s in device axes, status the bits of a pose's status;
+predicted_ns is how far --aligned turned q on past the newest gyroscope sample, timestamp_ns. Several filters get the
+same events and a row each at every instant. The same recording and options give the same bytes."""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,13 +51,19 @@ def run(arguments: argparse.Namespace) -> int:
     for kind, count in recording.dropped_rows.items():
         if count:
             print(f"posed: note: {count} {kind.name.lower()} rows out of time order are left out", file=sys.stderr)
-    poses = fuse_recording(
-        recording,
-        load_profile(arguments.profile),
-        sampling_period_us=RateMode[arguments.mode].sampling_period_us,
-        filter_name=arguments.filter,
-        pose_period_us=round(1e6 / arguments.rate),
-    )
+    profile = load_profile(arguments.profile)
+    streams = [
+        fuse_recording(
+            recording,
+            profile,
+            sampling_period_us=RateMode[arguments.mode].sampling_period_us,
+            filter_name=name,
+            pose_period_us=round(1e6 / arguments.rate),
+            aligned=arguments.aligned,
+        )
+        for name in arguments.filter
+    ]
+    poses = heapq.merge(*streams, key=lambda pose: pose.instant_ns)
     written = 0
     with _output(arguments.output) as output, _progress(output) as progress:
         bar = progress.add_task(recording.name, total=recording.end_ns - recording.start_ns)
@@ -66,8 +83,15 @@ def csv_row(pose: Pose) -> str:
     numbers = (*orientation.quaternion, *orientation.angular_rate, orientation.heading_accuracy)
     return (
         f"{pose.sequence},{orientation.timestamp_ns},{','.join(map(repr, numbers))},{int(orientation.status)},"
-        f"{pose.rate_mode.name},{pose.events_fused},{pose.filter_name}\n"
+        f"{pose.rate_mode.name},{pose.events_fused},{pose.filter_name},{pose.predicted_ns}\n"
     )
+
+
+def _filters(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    if len(set(names)) != len(names):
+        raise argparse.ArgumentTypeError(f"{text!r} names a filter twice")
+    return names
 
 
 @contextlib.contextmanager

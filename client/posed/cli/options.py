@@ -7,7 +7,7 @@ from typing import Any
 
 RATE_MODES = ("NORMAL", "UI", "GAME", "FASTEST")
 
-_DAEMON_OPTIONS = ("source", "profile", "filter", "seed", "speed", "loop", "position", "log_format")
+_DAEMON_OPTIONS = ("source", "profile", "filter", "seed", "speed", "loop", "position", "aligned", "log_format")
 
 
 def add_daemon_options(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +30,7 @@ def add_daemon_options(parser: argparse.ArgumentParser) -> None:
         metavar="LAT,LON,HEIGHT",
         help="where the phone is: degrees and metres above the ellipsoid (south of the equator: --position=-33.9,...)",
     )
+    add_aligned_option(group)
     group.add_argument(
         "--log-format", choices=("text", "json"), help="of the lines on stderr; json: one object a line (default: text)"
     )
@@ -49,6 +50,15 @@ def add_profile_option(parser: "argparse._ActionsContainer", default: str = argp
 def add_filter_option(parser: "argparse._ActionsContainer", default: str = argparse.SUPPRESS) -> None:
     """Add --filter."""
     parser.add_argument("--filter", default=default, metavar="NAME", help="orientation filter (default: dcm)")
+
+
+def add_aligned_option(parser: "argparse._ActionsContainer") -> None:
+    """Add --aligned."""
+    parser.add_argument(
+        "--aligned",
+        action="store_true",
+        help="turn each pose on to its instant by the newest angular rate, so that it does not lag",
+    )
 
 
 def add_rate_mode_option(parser: argparse.ArgumentParser) -> None:

@@ -9,6 +9,7 @@ from posed.client import Pose, PoseStatus, Position
 JSON_KEYS = """\
 sequence              index of the pose's grid instant
 timestamp_ns          sample time of the newest gyroscope sample in the pose
+predicted_ns          how far the quaternion was turned on past it; 0 unless the daemon runs with --aligned
 published_ns          when the daemon sent it, CLOCK_BOOTTIME
 boot_id               of the daemon, new at every start, hexadecimal
 missed                poses of the stream lost just before this one
@@ -34,6 +35,7 @@ def pose_json(pose: Pose) -> str:
         {
             "sequence": pose.sequence,
             "timestamp_ns": pose.timestamp_ns,
+            "predicted_ns": pose.predicted_ns,
             "published_ns": pose.delivery.published_ns,
             "boot_id": pose.delivery.boot_id.hex(),
             "missed": pose.missed,

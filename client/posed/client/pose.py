@@ -112,7 +112,8 @@ class Pose:
 
     timestamp_ns: sample time. quaternion: (x, y, z, w), device to world (east, magnetic north, up), w >= 0.
     angular_rate: rad/s, device axes. heading_accuracy: rad, one standard deviation. missed: poses of this stream that
-    the caller has not seen since the previous one it got.
+    the caller has not seen since the previous one it got. predicted_ns: how far the daemon turned the quaternion on
+    past timestamp_ns by the angular rate; 0 unless it aligns poses to their grid instants.
     """
 
     delivery: Delivery
@@ -126,6 +127,7 @@ class Pose:
     events_fused: int
     position: Position | None
     missed: int = 0
+    predicted_ns: int = 0
 
     @classmethod
     def of_message(cls, message: pose_pb2.PoseMessage) -> "Pose":
@@ -143,6 +145,7 @@ class Pose:
             pose_pb2.RateMode.Name(pose.rate_mode).removeprefix("RATE_MODE_"),
             pose.events_fused,
             _position(pose.position) if pose.HasField("position") else None,
+            predicted_ns=pose.predicted_ns,
         )
 
     @property

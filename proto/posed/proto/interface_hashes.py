@@ -8,6 +8,6 @@ HASHES = {
     "posed.IServiceConnection": "f4172856b07360238841d2268929627911abf5fc781ea07e8ad22499ba5d6a4d",
     "posed.ISensorService": "6f8325bc6e6bf18eaaf3c2753bcfd7f2e6c266785cf6e76880c2052d367def33",
     "posed.ISensorEventListener": "6f8325bc6e6bf18eaaf3c2753bcfd7f2e6c266785cf6e76880c2052d367def33",
-    "posed.IPoseService": "449403c8b188cab7ff102eb1688251d3e2af9b911b72c3a69d2952e07fff12c6",
-    "posed.IPoseListener": "449403c8b188cab7ff102eb1688251d3e2af9b911b72c3a69d2952e07fff12c6",
+    "posed.IPoseService": "a316e4d9941478d93958efd2ec6a4bdffaf02cd70d29fc7db136453d83949bbf",
+    "posed.IPoseListener": "a316e4d9941478d93958efd2ec6a4bdffaf02cd70d29fc7db136453d83949bbf",
 }

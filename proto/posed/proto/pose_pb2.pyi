@@ -79,7 +79,7 @@ class PoseMessage(_message.Message):
     def __init__(self, header: _Optional[_Union[_events_pb2.DeliveryHeader, _Mapping]] = ..., pose: _Optional[_Union[Pose, _Mapping]] = ...) -> None: ...
 
 class Pose(_message.Message):
-    __slots__ = ("timestamp_ns", "orientation", "angular_rate", "heading_accuracy", "filter", "status", "rate_mode", "events_fused", "position")
+    __slots__ = ("timestamp_ns", "orientation", "angular_rate", "heading_accuracy", "filter", "status", "rate_mode", "events_fused", "position", "predicted_ns")
     TIMESTAMP_NS_FIELD_NUMBER: _ClassVar[int]
     ORIENTATION_FIELD_NUMBER: _ClassVar[int]
     ANGULAR_RATE_FIELD_NUMBER: _ClassVar[int]
@@ -89,6 +89,7 @@ class Pose(_message.Message):
     RATE_MODE_FIELD_NUMBER: _ClassVar[int]
     EVENTS_FUSED_FIELD_NUMBER: _ClassVar[int]
     POSITION_FIELD_NUMBER: _ClassVar[int]
+    PREDICTED_NS_FIELD_NUMBER: _ClassVar[int]
     timestamp_ns: int
     orientation: Quaternion
     angular_rate: Vector3
@@ -98,7 +99,8 @@ class Pose(_message.Message):
     rate_mode: RateMode
     events_fused: int
     position: Position
-    def __init__(self, timestamp_ns: _Optional[int] = ..., orientation: _Optional[_Union[Quaternion, _Mapping]] = ..., angular_rate: _Optional[_Union[Vector3, _Mapping]] = ..., heading_accuracy: _Optional[float] = ..., filter: _Optional[str] = ..., status: _Optional[int] = ..., rate_mode: _Optional[_Union[RateMode, str]] = ..., events_fused: _Optional[int] = ..., position: _Optional[_Union[Position, _Mapping]] = ...) -> None: ...
+    predicted_ns: int
+    def __init__(self, timestamp_ns: _Optional[int] = ..., orientation: _Optional[_Union[Quaternion, _Mapping]] = ..., angular_rate: _Optional[_Union[Vector3, _Mapping]] = ..., heading_accuracy: _Optional[float] = ..., filter: _Optional[str] = ..., status: _Optional[int] = ..., rate_mode: _Optional[_Union[RateMode, str]] = ..., events_fused: _Optional[int] = ..., position: _Optional[_Union[Position, _Mapping]] = ..., predicted_ns: _Optional[int] = ...) -> None: ...
 
 class Quaternion(_message.Message):
     __slots__ = ("x", "y", "z", "w")

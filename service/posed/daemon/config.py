@@ -21,5 +21,7 @@ class DaemonConfig:
     loop: bool = False
     """Begin a replay again when it ends."""
     position: Position | None = None
+    aligned: bool = False
+    """Turn each pose on to its grid instant by the newest angular rate."""
     started: bool = True
     """False for a daemon that lives only while clients bind it."""

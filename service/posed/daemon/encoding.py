@@ -57,6 +57,7 @@ class PoseEncoder:
         message.status = int(orientation.status)
         message.rate_mode = cast("pose_pb2.RateMode", pose.rate_mode)
         message.events_fused = pose.events_fused
+        message.predicted_ns = pose.predicted_ns
         if pose.position is None:
             message.ClearField("position")
         else:

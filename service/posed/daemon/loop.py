@@ -65,7 +65,7 @@ class _Daemon:
             config.source, profile, clock, seed=config.seed, speed=config.speed, loop=config.loop
         )
         orientation_filter = make_device_filter(config.filter, profile)
-        self._service = SensorService(self._source, orientation_filter, clock, config.position)
+        self._service = SensorService(self._source, orientation_filter, clock, config.position, aligned=config.aligned)
         self._context = context()
         self._server = Server(control_path(directory), self._context)
         statistics = PublicationStatistics()

@@ -85,6 +85,7 @@ class AdaptiveFilter:
         self._acc_late_ns = round((p.acc_delay_s - p.gyro_delay_s) * 1e9)
         self._mag_late_ns = round((p.mag_delay_s - p.gyro_delay_s) * 1e9)
         self._tilt_time_s = p.tilt.time_s
+        self._two_damping = 2.0 * p.tilt.damping
         self._use(state if state is not None else AdaptiveState.fresh(p))
 
     def update(self, sensor_type: SensorType, timestamp_ns: int, x: float, y: float, z: float) -> None:
@@ -169,7 +170,7 @@ class AdaptiveFilter:
     def _use(self, state: AdaptiveState) -> None:
         p = self.params
         self.state = state
-        self._interval = GyroInterval(state.interval)
+        self._interval = GyroInterval(p.interval, state.interval)
         self._tilt = Tilt(p.tilt, state.tilt)
         self._rest = RestBias(p.rest, state.rest)
         self._bias = GyroBias(p.bias, state.bias)
@@ -364,7 +365,7 @@ class AdaptiveFilter:
             return
         if s.gyro_lost or not self._bias.due(tilt.turn_x, tilt.turn_y, dt):
             return
-        self._bias.follow(c, tilt.frequency)
+        self._bias.follow(c, tilt.frequency, self._two_damping)
         if rest.at_rest:
             self._bias.observe_rest(rest.rate_x, rest.rate_y, rest.rate_z)
         elif tilt.age_s > self._tilt_time_s:

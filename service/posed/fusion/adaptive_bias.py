@@ -90,15 +90,15 @@ class GyroBias:
         s.waited_s += dt
         return s.waited_s >= self._step_s
 
-    def follow(self, c: DirectionCosines, w: float) -> None:
-        """Take the rows of C (levelled) through the low-pass of corner `w` (rad/s) that the acceleration went through.
+    def follow(self, c: DirectionCosines, w: float, two_damping: float) -> None:
+        """Take the rows of C through the low-pass (corner `w` in rad/s) that the acceleration went through.
 
         Ends the step's wait; the observation, if there is to be one, comes after.
         """
         s = self.state
         dt = s.waited_s
         wdt = w * dt
-        share = 1.0 / (1.0 + wdt * (1.4142135623730951 + wdt))
+        share = 1.0 / (1.0 + wdt * (two_damping + wdt))
         pull = wdt * w
         s.east_slope_x = share * (s.east_slope_x + pull * (c.north_y * c.up_z - c.north_z * c.up_y - s.east_x))
         s.east_slope_y = share * (s.east_slope_y + pull * (c.north_z * c.up_x - c.north_x * c.up_z - s.east_y))

@@ -8,10 +8,27 @@ the newest interval only one side is known: the pose looks ahead over it, the fi
 from dataclasses import dataclass
 from math import cos, sin, sqrt
 
+from posed.fusion.filter import require_positive
+
 _EVEN = 1.5
 """Neighbouring intervals longer or shorter by this share say nothing about the slope: samples are missing."""
 _ERROR_MEAN_S = 2.0
 """s, over which the lost rotation's variance per second is averaged."""
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalParams:
+    """How the rotation within an interval is made up."""
+
+    slope: bool = True
+    """False takes the rate as the same all over an interval, for comparison."""
+    own_time: bool = True
+    """False lets measurements act at the end of the interval they fall in, for comparison."""
+    loss: float = 0.5
+    """One sigma of the rotation lost, as a share of the first term left out. Larger trusts slow gyroscopes less."""
+
+    def __post_init__(self) -> None:
+        require_positive(self)
 
 
 @dataclass
@@ -36,10 +53,13 @@ class IntervalState:
 class GyroInterval:
     """The newest interval: its rotation (closed once the next sample is there) and its part up to any time."""
 
-    def __init__(self, state: IntervalState) -> None:
+    def __init__(self, params: IntervalParams, state: IntervalState) -> None:
         self.state = state
+        self._slope = params.slope
+        self._own_time = params.own_time
+        self._loss2 = params.loss**2
         self.error2 = 0.0
-        """rad2, variance of the closed interval's rotation: the size of the first term left out."""
+        """rad2, variance of the closed interval's rotation."""
         self.x = self.y = self.z = 0.0
         """The last answer: a rotation vector (rad) or a vector that was carried."""
         self._wx = self._wy = self._wz = 0.0
@@ -80,24 +100,27 @@ class GyroInterval:
         self.error2 = 0.0
         if not (s.has_before and self._even(dt)):
             return
-        self._slope_x = x = 0.5 * (next_x - s.before_x)
-        self._slope_y = y = 0.5 * (next_y - s.before_y)
-        self._slope_z = z = 0.5 * (next_z - s.before_z)
         share = s.length_s * s.length_s / 12.0
-        self._cone_x = share * (wy * z - wz * y)
-        self._cone_y = share * (wz * x - wx * z)
-        self._cone_z = share * (wx * y - wy * x)
+        if self._slope:
+            self._slope_x = x = 0.5 * (next_x - s.before_x)
+            self._slope_y = y = 0.5 * (next_y - s.before_y)
+            self._slope_z = z = 0.5 * (next_z - s.before_z)
+            self._cone_x = share * (wy * z - wz * y)
+            self._cone_y = share * (wz * x - wx * z)
+            self._cone_z = share * (wx * y - wy * x)
         x = next_x - 2.0 * s.rate_x + s.before_x
         y = next_y - 2.0 * s.rate_y + s.before_y
         z = next_z - 2.0 * s.rate_z + s.before_z
         next_x = share * (wy * z - wz * y)
         next_y = share * (wz * x - wx * z)
         next_z = share * (wx * y - wy * x)
-        self.error2 = next_x * next_x + next_y * next_y + next_z * next_z
+        self.error2 = self._loss2 * (next_x * next_x + next_y * next_y + next_z * next_z)
         s.error_rate += (self.error2 - s.error_rate * s.length_s) / (_ERROR_MEAN_S + s.length_s)
 
     def turn(self, u: float) -> None:
         """Answer with the rotation from the interval's start to the share `u` of it; 1 is its end."""
+        if not self._own_time:
+            u = 1.0
         length = self.state.length_s
         straight = length * u
         bent = 0.5 * straight * (u - 1.0)
@@ -140,7 +163,7 @@ class GyroInterval:
         wy = s.rate_y - bias_y
         wz = s.rate_z - bias_z
         span = s.length_s + further_s
-        if not s.has_before:
+        if not (s.has_before and self._slope):
             return span * wx, span * wy, span * wz
         x = s.rate_x - s.before_x
         y = s.rate_y - s.before_y

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from posed.fusion.adaptive_bias import BiasParams, BiasState
 from posed.fusion.adaptive_field import FieldParams, FieldState
 from posed.fusion.adaptive_heading import HeadingParams, HeadingState
-from posed.fusion.adaptive_interval import IntervalState
+from posed.fusion.adaptive_interval import IntervalParams, IntervalState
 from posed.fusion.adaptive_iron import IronParams, IronState
 from posed.fusion.adaptive_tilt import TiltParams, TiltState
 from posed.fusion.direction_cosines import DirectionCosines
@@ -21,6 +21,7 @@ class AdaptiveParams:
     is measured as it happens.
     """
 
+    interval: IntervalParams = field(default_factory=IntervalParams)
     tilt: TiltParams = field(default_factory=TiltParams)
     bias: BiasParams = field(default_factory=BiasParams)
     rest: RestParams = field(default_factory=lambda: RestParams(learn_bias=False))

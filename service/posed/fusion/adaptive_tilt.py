@@ -18,7 +18,9 @@ class TiltParams:
 
     time_s: float = 3.0
     """s, time constant. Shorter follows linear acceleration, longer the gyroscope's errors."""
-    interval_noise: float = 0.03
+    damping: float = sqrt(0.5)
+    """Of the low-pass; sqrt(1/2) is Butterworth's. Far above 1 it is a low-pass of the first order."""
+    interval_noise: float = 0.0075
     """rad2/Hz, what the accelerometer's direction is worth against the rotation lost between slow gyroscope samples.
 
     The time constant T follows 1/T^2 = 1/time_s^2 + (that rotation's variance per second) / interval_noise.
@@ -54,6 +56,7 @@ class Tilt:
     def __init__(self, params: TiltParams, state: TiltState) -> None:
         self.state = state
         self._time_s = params.time_s
+        self._two_damping = 2.0 * params.damping
         self._interval_noise = params.interval_noise
         self._lost_s = params.lost_s
 
@@ -85,11 +88,11 @@ class Tilt:
             time_s = 1.0 / sqrt(1.0 / (self._time_s * self._time_s) + interval_error / self._interval_noise)
         if s.age_s < time_s:
             time_s = s.age_s
-        w = 1.4142135623730951 / time_s
+        w = self._two_damping / time_s
         s.frequency = w
-        # Damping sqrt(1/2), with the new value on the right-hand side: stable at any step.
+        # y'' = w^2 (a - y) - 2 damping w y', with the new values on the right-hand side: stable at any step.
         wdt = w * dt
-        share = 1.0 / (1.0 + wdt * (1.4142135623730951 + wdt))
+        share = 1.0 / (1.0 + wdt * (self._two_damping + wdt))
         pull = wdt * w
         s.slope_x = (s.slope_x + pull * x) * share
         s.slope_y = (s.slope_y + pull * y) * share

@@ -1,6 +1,7 @@
 """The filters by name."""
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 
 from posed.errors import InvalidArgumentError
 from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
@@ -11,12 +12,21 @@ from posed.fusion.filter import OrientationFilter, SensorNoise
 def make_filter(name: str, noise: SensorNoise | None = None) -> OrientationFilter:
     """Return a fresh filter; `noise` is that of the device profile, the default of SensorNoise without.
 
-    Raises InvalidArgumentError when no filter has this name.
+    Raises InvalidArgumentError when no filter has this name, MissingExtraError when its package is not installed.
     """
-    maker = FILTERS.get(name)
+    maker = FILTERS.get(name) or _packaged(name)
     if maker is None:
-        raise InvalidArgumentError(f"no filter is named {name!r}; choose one of {', '.join(sorted(FILTERS))}")
+        known = ", ".join(sorted({*FILTERS, *PACKAGED}))
+        raise InvalidArgumentError(f"no filter is named {name!r}; choose one of {known}")
     return maker(noise if noise is not None else SensorNoise())
+
+
+def _packaged(name: str) -> Callable[[SensorNoise], OrientationFilter] | None:
+    if name not in PACKAGED:
+        return None
+    module, attribute = PACKAGED[name]
+    maker: Callable[[SensorNoise], OrientationFilter] = getattr(import_module(module), attribute)
+    return maker
 
 
 def _dcm(noise: SensorNoise) -> OrientationFilter:
@@ -42,3 +52,9 @@ FILTERS: Mapping[str, Callable[[SensorNoise], OrientationFilter]] = {
     "game": _game,
     "geomag": _geomag,
 }
+
+PACKAGED: Mapping[str, tuple[str, str]] = {
+    "vqf": ("posed.fusion.vqf_adapter", "VqfFilter"),
+    "imufusion": ("posed.fusion.imufusion_adapter", "ImufusionFilter"),
+}
+"""Filters of other packages (extra `compare`), by the module and class that adapt them; imported when wanted."""

@@ -44,9 +44,9 @@ def load_trial(folder: Path) -> Recording:
     columns: dict[SensorType, EventColumn] = {}
     dropped: dict[SensorType, int] = {}
     for sensor_type, (name, width) in _STREAMS.items():
-        path = _find(folder, name)
+        path = find_stream(folder, name)
         if path:
-            columns[sensor_type], dropped[sensor_type] = _read_stream(path, width)
+            columns[sensor_type], dropped[sensor_type] = read_stream(path, width)
     if not columns:
         expected = ", ".join(name for name, _ in _STREAMS.values())
         raise RecordingError(f"{folder} holds no sensor stream; expected one or more of {expected}, plain or .gz")
@@ -55,25 +55,30 @@ def load_trial(folder: Path) -> Recording:
         raw = np.hstack([accelerometer.values, np.zeros_like(accelerometer.values)])
         columns[SensorType.ACCELEROMETER_UNCALIBRATED], _ = in_time_order(accelerometer.timestamp_ns, raw)
         dropped[SensorType.ACCELEROMETER_UNCALIBRATED] = dropped[SensorType.ACCELEROMETER]
-    rotation_vector = _find(folder, "rotation-vector.txt")
+    rotation_vector = find_stream(folder, "rotation-vector.txt")
     return Recording(
         name=folder.name,
         columns=columns,
         dropped_rows=dropped,
         declination=DECLINATION,
         load_truth=(lambda: _read_truth(folder)) if (folder / "qualisys.mat").exists() else None,
-        load_rotation_vector=(lambda: _read_stream(rotation_vector, 5)[0]) if rotation_vector else None,
+        load_rotation_vector=(lambda: read_stream(rotation_vector, 5)[0]) if rotation_vector else None,
     )
 
 
-def _find(folder: Path, name: str) -> Path | None:
+def find_stream(folder: Path, name: str) -> Path | None:
+    """Return the path of a folder's file, plain or gzipped, None if it has neither."""
     for path in (folder / name, folder / f"{name}.gz"):
         if path.exists():
             return path
     return None
 
 
-def _read_stream(path: Path, width: int) -> tuple[EventColumn, int]:
+def read_stream(path: Path, width: int) -> tuple[EventColumn, int]:
+    """Return a stream of `width` values behind each time, and how many rows were out of time order.
+
+    Raises RecordingError if the file is unreadable or malformed.
+    """
     text = read_text(path)
     try:
         rows = np.loadtxt(io.StringIO(text), dtype=np.float64, comments=None, ndmin=2)

@@ -11,6 +11,7 @@ from posed.events import EventColumn, FilterStatus, FlatEvent, Pose, Position, R
 from posed.fusion import make_filter
 from posed.fusion.filter import OrientationFilter, SensorNoise
 from posed.hal.profile import DeviceProfile
+from posed.sensors.alignment import aligned
 from posed.sensors.pose_grid import PoseGrid
 from posed.sensors.virtual import VirtualEvents
 
@@ -40,8 +41,11 @@ class _PoseRequest:
 class PoseFusion:
     """The filter and its poses. All times are sample time, ns."""
 
-    def __init__(self, orientation_filter: OrientationFilter, clock: Clock, position: Position | None) -> None:
+    def __init__(
+        self, orientation_filter: OrientationFilter, clock: Clock, position: Position | None, align: bool
+    ) -> None:
         self._filter = orientation_filter
+        self._align = align
         self._clock = clock
         self._position = position
         self._requests: dict[Hashable, _PoseRequest] = {}
@@ -163,6 +167,9 @@ class PoseFusion:
                         each.occurred |= orientation.status & _OCCURRENCES
             if grid.occurred:
                 orientation = replace(orientation, status=orientation.status | grid.occurred)
+            predicted_ns = 0
+            if self._align:
+                orientation, predicted_ns = aligned(orientation, grid.next_ns)
             self._poses.append(
                 Pose(
                     sequence=grid.next_index,
@@ -173,6 +180,7 @@ class PoseFusion:
                     rate_mode=self._rate_mode,
                     events_fused=self.events_fused - grid.events_before,
                     position=self._position,
+                    predicted_ns=predicted_ns,
                 )
             )
         grid.occurred = FilterStatus.OK

@@ -58,10 +58,13 @@ class SensorService:
         orientation_filter: OrientationFilter,
         clock: Clock,
         position: Position | None = None,
+        *,
+        aligned: bool = False,
     ) -> None:
+        """Fuse with this filter; `aligned` turns each pose on to its grid instant by the newest angular rate."""
         self._source = source
         self._clock = clock
-        self._fusion = PoseFusion(orientation_filter, clock, position)
+        self._fusion = PoseFusion(orientation_filter, clock, position, aligned)
         physical = source.sensors
         virtual = virtual_sensors(physical)
         self.sensors: tuple[SensorInfo, ...] = (*physical, *virtual)

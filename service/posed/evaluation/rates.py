@@ -1,0 +1,52 @@
+"""A trial's events at the rate modes of a phone, as the replay of it would deliver them."""
+
+from typing import Literal, get_args
+
+import numpy as np
+
+from posed.clock import VirtualClock
+from posed.errors import InvalidArgumentError
+from posed.evaluation.trial import INPUTS, Trial
+from posed.events import EventBatch, FlatEvent, RateMode
+from posed.hal.profile import DeviceProfile, load_profile
+from posed.hal.recording import Recording
+from posed.hal.replay import ReplaySource
+
+ModeName = Literal["native", "FASTEST", "GAME", "UI", "NORMAL"]
+MODES: tuple[ModeName, ...] = get_args(ModeName)
+"""Every event as it was recorded, and Android's rate modes."""
+
+PROFILE = "patonis2018"
+"""The device whose rates stand for the modes, and whose parts' noise filters are told."""
+
+
+def mode_events(trial: Trial, mode: ModeName, profile: DeviceProfile | None = None) -> list[FlatEvent]:
+    """Return a trial's events at a mode, in one order: by time, ties by sensor type (gyroscope last).
+
+    The modes are thinned from the recording at the profile's rates (default: PROFILE): the gyroscope by interval mean,
+    accelerometer and magnetometer by the sample nearest to the grid, at its own time. A mode as fast as the recording
+    leaves a stream as it is. Raises InvalidArgumentError for an unknown mode.
+    """
+    return mode_batch(trial, mode, profile).flat({int(kind): kind for kind in INPUTS})
+
+
+def mode_batch(trial: Trial, mode: ModeName, profile: DeviceProfile | None = None) -> EventBatch:
+    """Return a trial's events at a mode as columns by sensor type; see `mode_events`."""
+    if mode not in MODES:
+        raise InvalidArgumentError(f"mode {mode!r} is unknown; allowed: {', '.join(MODES)}")
+    columns = {kind: trial.recording.columns[kind] for kind in INPUTS}
+    if mode == "native":
+        return EventBatch({int(kind): column for kind, column in columns.items()})
+    recording = Recording(trial.name, columns, {})
+    source = ReplaySource(recording, profile or load_profile(PROFILE), VirtualClock())
+    for kind in INPUTS:
+        source.batch(int(kind), RateMode[mode].sampling_period_us * 1000, 0)
+        source.activate(int(kind), True)
+    return source.drain(recording.end_ns)
+
+
+def pose_instants(
+    events: list[FlatEvent], period_ns: int = 100_000_000
+) -> "np.ndarray[tuple[int], np.dtype[np.int64]]":
+    """Return the grid instants (int64[n], ns) on which the poses of these events stand: from the first event on."""
+    return np.arange(events[0][1], events[-1][1] + 1, period_ns, dtype=np.int64)

@@ -1,0 +1,51 @@
+"""What a filter costs: CPU time an event, in the fastest form it has."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from posed.clock import BootClock
+from posed.evaluation.trial import INPUTS
+from posed.events import EventBatch, EventColumn, Float64Array, SensorType
+from posed.fusion.filter import OrientationFilter
+from posed.fusion.paced import PacedFilter
+
+_RUNS = 3
+_ENOUGH_NS = 300_000_000
+
+
+def cpu_ns_per_event(make: Callable[[], OrientationFilter], batch: EventBatch) -> float:
+    """Return the CPU time (ns) of a fresh filter fed a whole trial, divided by the trial's events.
+
+    The least of three runs, fewer if they are long. A filter of another package is fastest over samples at one rate:
+    it gets the newest accelerometer and magnetometer sample at each gyroscope sample. Making these is not counted, and
+    the divisor stays the number of events, so that filters are compared over the same work.
+    """
+    events = batch.flat({int(kind): kind for kind in INPUTS})
+    samples = _at_gyroscope(batch) if isinstance(make(), PacedFilter) else None
+    clock = BootClock()
+    spent: list[int] = []
+    while len(spent) < _RUNS and sum(spent) < _ENOUGH_NS:
+        each = make()
+        started = clock.cpu_ns()
+        if isinstance(each, PacedFilter) and samples is not None:
+            each.update_synchronous(*samples)
+        else:
+            each.update_batch(events)
+        spent.append(clock.cpu_ns() - started)
+    return min(spent) / len(events)
+
+
+def _at_gyroscope(batch: EventBatch) -> tuple[float, Float64Array, Float64Array, Float64Array]:
+    """Return the gyroscope's period (s) and samples, and the newest of the others at each; all float64[n, 3]."""
+    gyro = batch.columns[SensorType.GYROSCOPE]
+    times = gyro.timestamp_ns
+    period_s = float(np.median(np.diff(times))) * 1e-9 if len(times) > 1 else 1.0
+
+    def newest(column: EventColumn) -> Float64Array:
+        rows = np.maximum(np.searchsorted(column.timestamp_ns, times, side="right") - 1, 0)
+        return np.ascontiguousarray(column.values[rows, :3])
+
+    acceleration = newest(batch.columns[SensorType.ACCELEROMETER])
+    field = newest(batch.columns[SensorType.MAGNETIC_FIELD])
+    return period_s, np.ascontiguousarray(gyro.values[:, :3]), acceleration, field
