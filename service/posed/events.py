@@ -178,6 +178,8 @@ class FilterStatus(IntFlag):
     """A time gap was bridged or a sample was out of order since the last pose."""
     BAD_SAMPLE = 64
     """A NaN, infinite or degenerate sample was rejected since the last pose."""
+    HEADING_FREE = 128
+    """No magnetometer sample for 1 s, or none wanted: heading runs on the gyroscope, from north if it was ever seen."""
 
 
 @dataclass(slots=True)

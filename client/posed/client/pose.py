@@ -18,6 +18,7 @@ class PoseStatus(IntFlag):
     FREE_FALL = 16
     GAP = 32
     BAD_SAMPLE = 64
+    HEADING_FREE = 128
 
 
 def boot_time_ns() -> int:

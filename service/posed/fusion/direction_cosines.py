@@ -141,6 +141,44 @@ class DirectionCosines:
             self.north_y = -east * ux - north * uy * uz
             self.north_z = north * length2
 
+    def face(self, ux: float, uy: float, uz: float) -> None:
+        """Take a unit vector (device axes) as up, and as north what is square to it along the most level device axis.
+
+        Of x and y the more level one counts first, so a phone held upright or flat faces along an edge.
+        """
+        across_x = abs(ux)
+        across_y = abs(uy)
+        if across_y <= across_x:
+            x, y, z = -uy * ux, 1.0 - uy * uy, -uy * uz
+        else:
+            x, y, z = 1.0 - ux * ux, -ux * uy, -ux * uz
+        norm = sqrt(x * x + y * y + z * z)
+        self.north_x = x / norm
+        self.north_y = y / norm
+        self.north_z = z / norm
+        self.up_x = ux
+        self.up_y = uy
+        self.up_z = uz
+
+    def tilt(self, x: float, y: float, z: float) -> None:
+        """Make the world direction (x, y, z) (unit vector, not down) the new vertical by the smallest rotation."""
+        ux = self.up_x
+        uy = self.up_y
+        uz = self.up_z
+        north_x = self.north_x
+        north_y = self.north_y
+        north_z = self.north_z
+        self.up_x = vx = x * (north_y * uz - north_z * uy) + y * north_x + z * ux
+        self.up_y = vy = x * (north_z * ux - north_x * uz) + y * north_y + z * uy
+        self.up_z = vz = x * (north_x * uy - north_y * ux) + y * north_z + z * uz
+        fold = y / (1.0 + z)
+        self.north_x = north_x - fold * (ux + vx)
+        self.north_y = north_y - fold * (uy + vy)
+        self.north_z = north_z - fold * (uz + vz)
+        self.turns += 1
+        if self.turns == _TURNS_TO_ROUNDING:
+            self._undo_rounding()
+
     def quaternion(self) -> tuple[float, float, float, float]:
         """Return the rotation as (x, y, z, w), device to world, w >= 0.
 

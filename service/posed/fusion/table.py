@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 
 from posed.errors import InvalidArgumentError
+from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
 from posed.fusion.dcm import DcmFilter, DcmParams
 from posed.fusion.filter import OrientationFilter, SensorNoise
 
@@ -32,7 +33,25 @@ def _dcm(noise: SensorNoise) -> OrientationFilter:
     return DcmFilter(DcmParams(noise=noise))
 
 
-FILTERS: Mapping[str, Callable[[SensorNoise], OrientationFilter]] = {"dcm": _dcm}
+def _adaptive(noise: SensorNoise) -> OrientationFilter:
+    """The noise of the parts is far below what this filter reckons with, so it is not asked for."""
+    return AdaptiveFilter()
+
+
+def _game(noise: SensorNoise) -> OrientationFilter:
+    return AdaptiveFilter(AdaptiveParams(use_magnetometer=False), name="game")
+
+
+def _geomag(noise: SensorNoise) -> OrientationFilter:
+    return AdaptiveFilter(AdaptiveParams(use_gyroscope=False), name="geomag")
+
+
+FILTERS: Mapping[str, Callable[[SensorNoise], OrientationFilter]] = {
+    "dcm": _dcm,
+    "dcm-adaptive": _adaptive,
+    "game": _game,
+    "geomag": _geomag,
+}
 
 PACKAGED: Mapping[str, tuple[str, str]] = {
     "vqf": ("posed.fusion.vqf_adapter", "VqfFilter"),
