@@ -16,8 +16,10 @@ from posed.sensors import SensorEventConnection, SensorService
 
 _log = logging.getLogger(__name__)
 
-# Keeps a message of the widest events (6 values) below 64 KiB: 1000 * (8 + 6 * 4 + 1) bytes.
-_EVENTS_A_MESSAGE = 1000
+# Keeps a message of the widest events (16 values) below 64 KiB: 800 * (8 + 16 * 4 + 1) bytes.
+_EVENTS_A_MESSAGE = 800
+# As SensorEventConnection.cpp: a listener that does not read is not to fill the log.
+_DROP_LOG_INTERVAL_NS = 2_000_000_000
 
 
 @dataclass(slots=True)
@@ -29,6 +31,8 @@ class _Listener:
     messages: int = 0
     events_sent: int = 0
     unsent: events_pb2.SensorEvents | None = None
+    last_drop_ns: int = -(1 << 62)
+    """When a drop was last told of, CLOCK_BOOTTIME."""
 
 
 class SensorServiceStub(Stub):
@@ -55,7 +59,7 @@ class SensorServiceStub(Stub):
 
         header makes the delivery header of a message from its sequence.
         """
-        for listener in self._listeners.values():
+        for listener in list(self._listeners.values()):
             while listener.unsent is not None or listener.connection:
                 if listener.unsent is None:
                     chunk = listener.connection.take(_EVENTS_A_MESSAGE)
@@ -71,9 +75,11 @@ class SensorServiceStub(Stub):
                     listener.unsent = None
                     continue
                 if not sent:
+                    self._drop_overflow(listener)
                     break
                 listener.events_sent += sum(len(column.timestamp_ns) for column in listener.unsent.columns)
                 listener.unsent = None
+            self._forget_if_idle(listener)
 
     def getSensorList(self, request: binder_pb2.Empty, caller: Caller) -> sensors_pb2.SensorList:
         return encoding.sensor_list(self._service.sensors)
@@ -92,7 +98,9 @@ class SensorServiceStub(Stub):
         listener = self._listeners.get((caller.peer, request.listener))
         if listener is not None:
             self._service.disable(listener.connection, request.handle)
-            self._forget_if_idle(listener)
+            if not listener.connection.registrations:
+                # Nobody is there any more for what still waits.
+                del self._listeners[listener.peer, listener.name]
         return binder_pb2.Empty()
 
     def flush(self, request: sensors_pb2.FlushRequest, caller: Caller) -> binder_pb2.Empty:
@@ -155,8 +163,22 @@ class SensorServiceStub(Stub):
         return listener
 
     def _forget_if_idle(self, listener: _Listener) -> None:
-        if not self._service.is_registered(listener.connection):
-            del self._listeners[listener.peer, listener.name]
+        # A one-shot sensor leaves its listener before its event does.
+        waits = listener.unsent is not None or listener.connection
+        if not listener.connection.registrations and not waits:
+            self._listeners.pop((listener.peer, listener.name), None)
+
+    def _drop_overflow(self, listener: _Listener) -> None:
+        dropped = listener.connection.drop_overflow()
+        if dropped and self._clock.now_ns() - listener.last_drop_ns > _DROP_LOG_INTERVAL_NS:
+            listener.last_drop_ns = self._clock.now_ns()
+            _log.warning(
+                "listener %r of process %d does not read: %d events dropped, %d in all",
+                listener.name,
+                listener.peer.pid,
+                dropped,
+                listener.connection.events_dropped,
+            )
 
     def _peer_died(self, peer: Peer) -> None:
         self._watched.discard(peer)
