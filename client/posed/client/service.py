@@ -21,6 +21,7 @@ from posed.binder.sockets import Context, Socket, context
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
 from posed.binder.stub import Caller, Stub
 from posed.client.launcher import ensure_daemon
+from posed.client.package import Package
 from posed.errors import InvalidStateError, PosedError, ServiceUnavailableError
 from posed.proto import binder_pb2, service_manager_pb2
 
@@ -69,12 +70,15 @@ class Service:
         binding: Binding,
         *,
         auto_create: bool,
+        package: Package | None = None,
         on_service_connected: Callable[[], None] | None = None,
         on_service_disconnected: Callable[[], None] | None = None,
         on_binding_died: Callable[[str], None] | None = None,
     ) -> None:
         self._binding = binding
         self._auto_create = auto_create
+        self.package = package or Package()
+        """What this program says of itself when it binds."""
         self._on_connected = on_service_connected
         self._on_disconnected = on_service_disconnected
         self._on_died = on_binding_died
@@ -272,7 +276,13 @@ class Service:
         self._retry_at = None
         try:
             self._manager().bindService(
-                service_manager_pb2.BindRequest(auto_create=self._auto_create, connection="connection")
+                service_manager_pb2.BindRequest(
+                    auto_create=self._auto_create,
+                    connection="connection",
+                    package_name=self.package.name,
+                    target_sdk=self.package.target_sdk,
+                    permissions=self.package.permissions,
+                )
             )
             self._binding.bind(self)
         except DeadObjectError:

@@ -180,6 +180,12 @@ class SensorService:
         return self._fusion.sampling_period_us
 
     @property
+    def fusion_clients(self) -> int:
+        """How many want what the filter says: the pose, and every listener of a fused sensor."""
+        listeners = sum(len(sensor.listeners) for sensor in self._table.values() if sensor.is_virtual)
+        return listeners + (self._fusion.sampling_period_us is not None)
+
+    @property
     def events_fused(self) -> int:
         """Events that have reached the filter."""
         return self._fusion.events_fused
