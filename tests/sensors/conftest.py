@@ -74,6 +74,7 @@ class RegularSource:
         self._modes = {sensor.handle: sensor.reporting_mode for sensor in self.sensors}
         self._happened: dict[int, list[tuple[int, float]]] = {}
         self._present: dict[int, float] = {}
+        self.value = 1.0
         self.is_lost = False
         self.flush_is_slow = False
         self.flushes_asked = 0
@@ -106,7 +107,7 @@ class RegularSource:
         self._require_phone()
         self.calls.append(("activate", handle, enabled))
         if enabled:
-            self._done_ns[handle] = self._now_ns
+            self._done_ns[handle] = max(self._now_ns, self.time_map.to_sample(self.clock.now_ns()))
             if self._modes.get(handle) is ReportingMode.ON_CHANGE:
                 self._happened.setdefault(handle, []).append((self._now_ns + 1, self._present.get(handle, 0.0)))
         else:
@@ -137,7 +138,7 @@ class RegularSource:
             period = self._period_ns[handle]
             until_ns = until_ns if self.end_ns is None else min(until_ns, self.end_ns)
             times = np.arange(done_ns // period + 1, until_ns // period + 1, dtype=np.int64) * period
-            columns[handle] = EventColumn(times, np.full((len(times), 3), 1.0), np.full(len(times), 3, np.int8))
+            columns[handle] = EventColumn(times, np.full((len(times), 3), self.value), np.full(len(times), 3, np.int8))
             self._done_ns[handle] = until_ns
         flushes, self._flushes = ([], self._flushes) if self.flush_is_slow else (self._flushes, [])
         connected, self.connected = self.connected, ()
