@@ -1,7 +1,8 @@
 """Clients that count what they receive: python counting_clients.py NUMBER...
 
-Each listens to three or four sensors at a rate, a latency and with or without decimation by its number. The process
-says "ready", and for each line on stdin what its clients have got, as one line of JSON.
+Each listens to two sensors at a rate, a latency and with or without decimation by its number; numbers 1 and 25 to all
+there are, each event as it happens. The process says "ready", and for each line on stdin what its clients have got, as
+one line of JSON.
 """
 
 import json
@@ -13,14 +14,13 @@ from posed.client import (
     SENSOR_DELAY_NORMAL,
     SENSOR_DELAY_UI,
     Package,
-    Sensor,
     SensorEvent,
     SensorManager,
 )
 
 _RATES = (SENSOR_DELAY_FASTEST, SENSOR_DELAY_GAME, SENSOR_DELAY_UI, SENSOR_DELAY_NORMAL, 100_000)
 _LATENCIES_US = (0, 0, 50_000, 500_000)
-_KINDS = (Sensor.TYPE_ACCELEROMETER, Sensor.TYPE_MAGNETIC_FIELD, Sensor.TYPE_GYROSCOPE, Sensor.TYPE_GRAVITY)
+_EVERYTHING = (1, 25)
 
 
 class CountingClient:
@@ -30,10 +30,13 @@ class CountingClient:
         self.name = f"com.example.client{number:02d}"
         self.times: dict[int, list[int]] = {}
         self.manager = SensorManager(package=Package(self.name))
-        for kind in _KINDS[: 3 + number % 2]:
+        sensors = self.manager.get_sensor_list()
+        if number not in _EVERYTHING:
+            sensors = [sensors[(number + k) % len(sensors)] for k in range(2)]
+        for sensor in sensors:
             if not self.manager.register_listener(
                 self,
-                self.manager.get_default_sensor(kind),
+                sensor,
                 _RATES[number % len(_RATES)],
                 _LATENCIES_US[number % len(_LATENCIES_US)],
                 decimate=number % 7 == 3,

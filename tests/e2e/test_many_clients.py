@@ -54,8 +54,8 @@ def _report(process: "subprocess.Popen[str]") -> dict[str, Any]:
 def test_dumpsys_agrees_exactly_with_what_each_of_20_clients_received(
     desk: Any, tmp_path: Path, eventually: Eventually
 ) -> None:
-    recording = _recording(tmp_path / "walk.csv", 18)
-    desk.serve("--source", f"replay:{recording}", "--speed", "3")
+    recording = _recording(tmp_path / "walk.csv", 30)
+    desk.serve("--source", f"replay:{recording}", "--speed", "5")
     crowd = _begin(desk, *range(19))
     slow = _begin(desk, 25)
     with SensorManager() as manager:
