@@ -4,18 +4,19 @@ from collections.abc import Hashable
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
-from posed.events import Pose, Position, ReportingMode, SensorInfo, SensorType
+from posed.events import Pose, Position, ReportingMode, SensorInfo
 from posed.fusion.filter import OrientationFilter
 from posed.hal.source import SensorSource
 from posed.sensors.active_sensor import ActiveSensor
-from posed.sensors.arbitration import BatchParams, arbitrate, clamp_period_ns
+from posed.sensors.arbitration import clamp_period_ns
 from posed.sensors.client import CAPPED_SAMPLING_PERIOD_US, Client
 from posed.sensors.connection import MAX_FLUSH_COMPLETES, SensorEventConnection, SensorRegistration
 from posed.sensors.decimation import Decimator
 from posed.sensors.device import SensorDevice
 from posed.sensors.pose_fusion import PoseFusion
 from posed.sensors.registration_log import RegistrationLog, RegistrationRecord
-from posed.sensors.virtual import FUSION_INPUTS, LEAD, input_periods_ns, virtual_sensors
+from posed.sensors.sensor_table import SensorTable
+from posed.sensors.virtual import FUSION_INPUTS
 
 # A service this far behind (sample time) was suspended or stopped: to make up for hours would block it for minutes.
 _LONGEST_LAG_NS = 5_000_000_000
@@ -38,18 +39,9 @@ class SensorService:
         self._device = SensorDevice(source, clock)
         self.orientation_filter = orientation_filter
         self._fusion = PoseFusion(orientation_filter, clock, position)
-        physical = self._device.sensors
-        virtual = virtual_sensors(physical)
-        self.sensors: tuple[SensorInfo, ...] = (*physical, *virtual)
-        """The static list: the source's, then the virtual ones."""
-        self._table = {info.handle: ActiveSensor(info) for info in physical}
-        self._inputs = {info.handle: info.type for info in physical if info.type in FUSION_INPUTS}
-        self._table.update({info.handle: ActiveSensor(info, self._input(LEAD)) for info in virtual})
-        self._active: list[ActiveSensor] = []
+        self._table = SensorTable(self._device, clock)
         self._connections: dict[SensorEventConnection, None] = {}
         self.registrations = RegistrationLog()
-        self.dynamic_changes = 0
-        """Counts dynamic sensors that came or went."""
         self._now_ns = 0
         self._due_ns: int | None = None
 
@@ -74,7 +66,7 @@ class SensorService:
         whatever others ask; Android has no such thing.
         Raises InvalidArgumentError for an unknown handle, a negative period or latency, or a sensor it already has.
         """
-        sensor = self._sensor(handle)
+        sensor = self._table[handle]
         if sampling_period_us < 0 or max_report_latency_us < 0:
             raise InvalidArgumentError(
                 f"sampling period {sampling_period_us} us and latency {max_report_latency_us} us must not be negative"
@@ -91,7 +83,7 @@ class SensorService:
         if decimate and sensor.info.reporting_mode is ReportingMode.CONTINUOUS:
             registration.decimator = Decimator(period_ns)
         self._join(sensor, connection, registration)
-        self._request_for(sensor, (connection, handle), period_ns, max_report_latency_us * 1000)
+        self._table.request(sensor, (connection, handle), period_ns, max_report_latency_us * 1000)
         if registration.first_flush_pending:
             self._device.flush(handle)
             sensor.flushing.append(connection)
@@ -107,7 +99,7 @@ class SensorService:
         """Undo `enable`; a sensor the connection does not have is left alone."""
         if handle in connection.registrations:
             self.advance()
-            self._leave(self._sensor(handle), connection)
+            self._leave(self._table[handle], connection)
 
     def disconnect(self, connection: SensorEventConnection) -> None:
         """Undo every `enable` of a connection."""
@@ -161,18 +153,18 @@ class SensorService:
 
         Raises InvalidArgumentError if the source cannot carry a pose or a period is out of range.
         """
-        if len(self._inputs) < len(FUSION_INPUTS):
-            missing = ", ".join(kind.string_type for kind in FUSION_INPUTS if kind not in self._inputs.values())
+        if len(self._table.inputs) < len(FUSION_INPUTS):
+            missing = ", ".join(kind.string_type for kind in FUSION_INPUTS if kind not in self._table.inputs.values())
             raise InvalidArgumentError(f"no pose from this source: it has no {missing}")
         self.advance()
         self._fusion.request(key, pose_period_us, sampling_period_us, self._sample_now_ns())
-        self._follow_pose_requests()
+        self._table.request_inputs(_POSE, self._fusion.sampling_period_us)
 
     def unregister_pose(self, key: Hashable) -> None:
         """Undo `register_pose`; an unknown key is left alone."""
         self.advance()
         self._fusion.withdraw(key, self._sample_now_ns())
-        self._follow_pose_requests()
+        self._table.request_inputs(_POSE, self._fusion.sampling_period_us)
 
     @property
     def pose_sampling_period_us(self) -> int | None:
@@ -182,7 +174,7 @@ class SensorService:
     @property
     def fusion_clients(self) -> int:
         """How many want what the filter says: the pose, and every listener of a fused sensor."""
-        listeners = sum(len(sensor.listeners) for sensor in self._table.values() if sensor.is_virtual)
+        listeners = sum(len(sensor.listeners) for sensor in self._table.all if sensor.is_virtual)
         return listeners + (self._fusion.sampling_period_us is not None)
 
     @property
@@ -206,19 +198,29 @@ class SensorService:
         return self._device.end_ns is not None and self._now_ns >= self._device.end_ns
 
     @property
+    def sensors(self) -> tuple[SensorInfo, ...]:
+        """The static list: the source's, then the virtual ones."""
+        return self._table.listed
+
+    @property
+    def dynamic_changes(self) -> int:
+        """Counts dynamic sensors that came or went."""
+        return self._table.dynamic_changes
+
+    @property
     def dynamic_sensors(self) -> tuple[SensorInfo, ...]:
         """The sensors that came while the source ran and are still there."""
-        return tuple(sensor.info for sensor in self._table.values() if sensor.info.is_dynamic)
+        return tuple(sensor.info for sensor in self._table.all if sensor.info.is_dynamic)
 
     @property
     def all_sensors(self) -> tuple[ActiveSensor, ...]:
         """Every sensor, in the order of the list."""
-        return tuple(self._table.values())
+        return tuple(self._table.all)
 
     @property
     def active_sensors(self) -> tuple[ActiveSensor, ...]:
         """The sensors that somebody has registered."""
-        return tuple(self._active)
+        return tuple(self._table.active)
 
     # Moving on
 
@@ -228,8 +230,8 @@ class SensorService:
         end_ns = device.end_ns
         due = [t for t in self._fusion.next_instants_ns() if end_ns is None or t <= end_ns]
         if self._fusion.awaits_first_sample:
-            due += [t for t in map(device.next_sample_ns, self._inputs) if t is not None]
-        for sensor in self._active:
+            due += [t for t in map(device.next_sample_ns, self._table.inputs) if t is not None]
+        for sensor in self._table.active:
             latency_ns = sensor.latency_ns
             if latency_ns is None:
                 continue
@@ -241,13 +243,13 @@ class SensorService:
                     due.append(next_ns)
         self._due_ns = min(due, default=None)
         deadline_ns = None if self._due_ns is None else device.time_map.to_boot(self._due_ns)
-        if device.retry_ns is not None and self._active:
+        if device.retry_ns is not None and self._table.active:
             return device.retry_ns if deadline_ns is None else min(deadline_ns, device.retry_ns)
         return deadline_ns
 
     def advance(self) -> None:
         """Bring everything up to the clock: drain the source, fuse, fill the connections and the poses."""
-        if not self._active:
+        if not self._table.active:
             return
         now_ns = self._sample_now_ns()
         if self._due_ns is not None and now_ns - self._due_ns > _LONGEST_LAG_NS:
@@ -268,42 +270,24 @@ class SensorService:
         self._now_ns = now_ns
         batch = self._device.drain(now_ns)
         if batch.connected:
-            self._table.update({info.handle: ActiveSensor(info) for info in batch.connected})
-            self.dynamic_changes += len(batch.connected)
+            self._table.connect(batch)
         # A recording that has ended moves no pose on: its last sample is the last thing known.
         end_ns = self._device.end_ns
         until_ns = now_ns if end_ns is None else min(now_ns, end_ns)
-        wants_virtual = any(sensor.is_virtual for sensor in self._active)
-        virtual = self._fusion.fuse(batch.flat(self._inputs), until_ns, wants_virtual)
-        boot_ns = self._clock.now_ns()
-        for handle, column in (*batch.columns.items(), *virtual.items()):
-            self._table[handle].take_in(column, boot_ns)
+        wants_virtual = any(sensor.is_virtual for sensor in self._table.active)
+        virtual = self._fusion.fuse(batch.flat(self._table.inputs), until_ns, wants_virtual)
+        self._table.take_in((*batch.columns.items(), *virtual.items()))
         self._release_due()
         for handle in batch.flush_completes:
             self._release(self._table[handle])
         for handle in batch.flush_completes:
             self._table[handle].flushing.popleft().complete_flush(handle)
         for handle in batch.disconnected:
-            self._remove_dynamic(self._table.pop(handle))
-
-    def _remove_dynamic(self, gone: ActiveSensor) -> None:
-        for connection in gone.listeners:
-            self._forget(connection, gone.info.handle)
-        self._active = [each for each in self._table.values() if each.requests]
-        self.dynamic_changes += 1
+            for connection in self._table.disconnect(handle).listeners:
+                self._forget(connection, handle)
 
     def _sample_now_ns(self) -> int:
         return self._device.time_map.to_sample(self._clock.now_ns())
-
-    def _sensor(self, handle: int) -> ActiveSensor:
-        try:
-            return self._table[handle]
-        except KeyError:
-            known = ", ".join(str(handle) for handle in self._table)
-            raise InvalidArgumentError(f"no sensor has handle {handle}; the sensor list has {known}") from None
-
-    def _input(self, kind: SensorType) -> ActiveSensor:
-        return next(self._table[handle] for handle, type_ in self._inputs.items() if type_ is kind)
 
     def _join(self, sensor: ActiveSensor, connection: SensorEventConnection, registration: SensorRegistration) -> None:
         """Add a listener, who is not to see what was sampled for others before now."""
@@ -324,8 +308,7 @@ class SensorService:
         """Take a listener's sensor from it."""
         handle = sensor.info.handle
         sensor.listeners.remove(connection)
-        for affected in list(self._table.values()):
-            self._withdraw(affected, (connection, handle))
+        self._table.withdraw((connection, handle))
         self._forget(connection, handle)
 
     def _forget(self, connection: SensorEventConnection, handle: int) -> None:
@@ -334,51 +317,10 @@ class SensorService:
             self._connections.pop(connection, None)
         self.registrations.add(RegistrationRecord(self._clock.now_ns(), False, handle, connection.client))
 
-    def _request_for(self, sensor: ActiveSensor, key: Hashable, period_ns: int, latency_ns: int) -> None:
-        self._request(sensor, key, BatchParams(period_ns, latency_ns))
-        if sensor.is_virtual:
-            for kind, input_ns in input_periods_ns(period_ns).items():
-                source = self._input(kind)
-                clamped_ns = clamp_period_ns(input_ns // 1000, source.info)
-                self._request(source, key, BatchParams(clamped_ns, latency_ns if source is sensor.lead else None))
-
-    def _request(self, sensor: ActiveSensor, key: Hashable, params: BatchParams) -> None:
-        if sensor.requests.get(key) != params:
-            sensor.requests[key] = params
-            self._configure(sensor)
-
-    def _withdraw(self, sensor: ActiveSensor, key: Hashable) -> None:
-        if sensor.requests.pop(key, None) is not None:
-            self._configure(sensor)
-
-    def _configure(self, sensor: ActiveSensor) -> None:
-        """Hand the source what the registrations come to, only if it changed."""
-        before, sensor.params = sensor.params, arbitrate(sensor.requests.values())
-        if sensor.params == before:
-            return
-        self._active = [each for each in self._table.values() if each.requests]
-        if not sensor.is_virtual:
-            sensor.configured_period_ns = self._device.configure(sensor.info.handle, sensor.params)
-        if sensor.params is None:
-            sensor.discard()
-            sensor.flushing.clear()
-        else:
-            release_ns = self._sample_now_ns() + (sensor.latency_ns or 0)
-            sensor.release_ns = min(sensor.release_ns, release_ns) if sensor.pending else release_ns
-
-    def _follow_pose_requests(self) -> None:
-        sampling_us = self._fusion.sampling_period_us
-        for handle in self._inputs:
-            sensor = self._table[handle]
-            if sampling_us is None:
-                self._withdraw(sensor, _POSE)
-            else:
-                self._request(sensor, _POSE, BatchParams(clamp_period_ns(sampling_us, sensor.info), None))
-
     def _release_due(self) -> None:
         """Let go what streams; once one batched sensor is due or full, let all batched ones go, as one FIFO does."""
         batched = []
-        for sensor in self._active:
+        for sensor in self._table.active:
             if sensor.latency_ns == 0:
                 self._release(sensor)
             elif sensor.latency_ns:
