@@ -19,6 +19,8 @@ class ActiveSensor:
     """Of a virtual sensor, the physical one whose events its own follow."""
     requests: dict[Hashable, BatchParams] = field(default_factory=dict)
     params: BatchParams | None = None
+    latency_ns: int | None = None
+    """Report latency in force: 0 streams, None if nobody listens."""
     configured_period_ns: int = 0
     listeners: list[SensorEventConnection] = field(default_factory=list)
     flushing: deque[SensorEventConnection] = field(default_factory=deque)
@@ -29,42 +31,39 @@ class ActiveSensor:
     release_ns: int = 0
     """Sample time at which pending events must go out."""
     recent: RecentEventLogger = field(init=False)
+    is_virtual: bool = field(init=False)
+    """True if it is computed from other sensors' events."""
+    is_one_shot: bool = field(init=False)
+    """True if it reports once and is off then."""
 
     def __post_init__(self) -> None:
         self.recent = RecentEventLogger(self.info.type)
+        self.is_virtual = self.lead is not None
+        self.is_one_shot = self.info.reporting_mode is ReportingMode.ONE_SHOT
 
-    @property
-    def is_virtual(self) -> bool:
-        """True if it is computed from other sensors' events."""
-        return self.lead is not None
-
-    @property
-    def is_one_shot(self) -> bool:
-        """True if it reports once and is off then."""
-        return self.info.reporting_mode is ReportingMode.ONE_SHOT
-
-    @property
-    def latency_ns(self) -> int | None:
-        """Report latency in force: 0 streams, None if nobody listens."""
-        if self.params is None or self.params.max_report_latency_ns is None:
-            return None
-        fifo_ns = self.info.fifo_max_event_count * self.params.sampling_period_ns
-        latency = min(self.params.max_report_latency_ns, fifo_ns)
-        return latency if latency > self.params.sampling_period_ns else 0
+    def follow(self, params: BatchParams | None) -> None:
+        """Take over what the requests come to."""
+        self.params = params
+        self.latency_ns = None
+        if params is not None and params.max_report_latency_ns is not None:
+            fifo_ns = self.info.fifo_max_event_count * params.sampling_period_ns
+            latency_ns = min(params.max_report_latency_ns, fifo_ns)
+            self.latency_ns = latency_ns if latency_ns > params.sampling_period_ns else 0
 
     def take_in(self, column: EventColumn, boot_ns: int) -> None:
         """Note events that have come, and hold them for the listeners."""
         if self.is_one_shot:
             # Off by itself with its first event: what was computed beyond it never happened.
             column = column[: 0 if self.pending else 1]
-        if not len(column):
+        count = len(column)
+        if not count:
             return
-        self.events += len(column)
+        self.events += count
         if self.requests:
             self.recent.add(column, boot_ns)
         if self.listeners:
             self.pending.append(column)
-            self.pending_events += len(column)
+            self.pending_events += count
 
     def release(self) -> bool:
         """Queue what is held for every listener; False if nothing was."""

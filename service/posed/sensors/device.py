@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from posed.clock import Clock, TimeMap
 from posed.errors import SourceLostError
-from posed.events import EventBatch
+from posed.events import EventBatch, SensorInfo
 from posed.hal.source import SensorSource
 from posed.sensors.arbitration import BatchParams
 from posed.sensors.quantisation import Quantiser, as_listed
@@ -28,7 +28,7 @@ class SensorDevice:
     def __init__(self, source: SensorSource, clock: Clock) -> None:
         self._source = source
         self._clock = clock
-        self.sensors = tuple(as_listed(info) for info in source.sensors)
+        self.sensors: tuple[SensorInfo, ...] = tuple(as_listed(info) for info in source.sensors)
         self._quantisers = {info.handle: Quantiser(info) for info in self.sensors}
         self._active: dict[int, BatchParams] = {}
         self._flushing: list[int] = []
@@ -77,24 +77,18 @@ class SensorDevice:
         """Return what is new up to `until_ns` (sample time), rounded; nothing but flush-completes while it is lost."""
         if self.retry_ns is not None and self._clock.now_ns() >= self.retry_ns:
             self._reconnect()
+        if self.retry_ns is not None:
+            return self._drain_of_lost()
         started = self._clock.cpu_ns()
-        batch = self._call(lambda: self._source.drain(until_ns))
-        self.cpu_ns += self._clock.cpu_ns() - started
-        if batch is None:
-            flushes, self._flushing = self._flushing, []
-            gone = sorted(self._dynamic)
-            for handle in gone:
-                self._drop_dynamic(handle)
-            return EventBatch({}, flushes, (), gone)
-        connected = tuple(as_listed(info) for info in batch.connected)
-        for info in connected:
-            self._quantisers[info.handle] = Quantiser(info)
-            self._dynamic.add(info.handle)
-        for handle in batch.disconnected:
-            self._drop_dynamic(handle)
+        try:
+            batch = self._source.drain(until_ns)
+        except SourceLostError as error:
+            self._note_loss(error)
+            return self._drain_of_lost()
+        finally:
+            self.cpu_ns += self._clock.cpu_ns() - started
+        connected = self._follow_dynamic(batch) if batch.connected or batch.disconnected else ()
         columns = {handle: self._quantisers[handle](column) for handle, column in batch.columns.items()}
-        if not batch.flush_completes:
-            return EventBatch(columns, (), connected, batch.disconnected)
         flushes = []
         for handle in batch.flush_completes:
             if handle in self._flushing:  # a flush-complete that nobody asked for is nobody's
@@ -104,11 +98,33 @@ class SensorDevice:
 
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if none is expected."""
-        return self._call(lambda: self._source.next_sample_ns(handle))
+        if self.retry_ns is not None:
+            return None
+        try:
+            return self._source.next_sample_ns(handle)
+        except SourceLostError as error:
+            self._note_loss(error)
+            return None
 
     def resume(self) -> None:
         """Go on after a time in which nobody could drain."""
         self._call(self._source.resume)
+
+    def _drain_of_lost(self) -> EventBatch:
+        flushes, self._flushing = self._flushing, []
+        gone = sorted(self._dynamic)
+        for handle in gone:
+            self._drop_dynamic(handle)
+        return EventBatch({}, flushes, (), gone)
+
+    def _follow_dynamic(self, batch: EventBatch) -> tuple[SensorInfo, ...]:
+        connected = tuple(as_listed(info) for info in batch.connected)
+        for info in connected:
+            self._quantisers[info.handle] = Quantiser(info)
+            self._dynamic.add(info.handle)
+        for handle in batch.disconnected:
+            self._drop_dynamic(handle)
+        return connected
 
     def _drop_dynamic(self, handle: int) -> None:
         self._dynamic.discard(handle)
@@ -135,8 +151,11 @@ class SensorDevice:
         try:
             return action()
         except SourceLostError as error:
-            self.retry_ns = self._clock.now_ns() + RECONNECT_INTERVAL_NS
-            if not self._lost:
-                _log.warning("the source is lost; its clients see a gap until it is back: %s", error)
-            self._lost = True
+            self._note_loss(error)
             return None
+
+    def _note_loss(self, error: SourceLostError) -> None:
+        self.retry_ns = self._clock.now_ns() + RECONNECT_INTERVAL_NS
+        if not self._lost:
+            _log.warning("the source is lost; its clients see a gap until it is back: %s", error)
+        self._lost = True

@@ -105,9 +105,10 @@ class SensorTable:
 
     def _configure(self, sensor: ActiveSensor) -> None:
         """Hand the source what the requests come to, only if it changed."""
-        before, sensor.params = sensor.params, arbitrate(sensor.requests.values())
-        if sensor.params == before:
+        params = arbitrate(sensor.requests.values())
+        if params == sensor.params:
             return
+        sensor.follow(params)
         self._follow_requests()
         if not sensor.is_virtual:
             sensor.configured_period_ns = self._device.configure(sensor.info.handle, sensor.params)
