@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from posed.errors import InvalidArgumentError
 from posed.events import SensorInfo, SensorType
 from posed.sensors import SensorEventConnection
 
@@ -148,3 +149,23 @@ def test_a_lost_source_takes_its_dynamic_sensors_along(make_bench: MakeBench) ->
     bench.source.calls.clear()
     bench.advance_ms(1000)
     assert [call[1] for call in bench.source.calls] == [GYRO, GYRO]
+
+
+def test_a_sensor_that_the_source_refuses_leaves_no_trace(
+    make_bench: MakeBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = make_bench((GYRO,))
+    listener = bench.service.connect()
+
+    def refuse(*_: int) -> int:
+        raise InvalidArgumentError("no such period")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(bench.source, "batch", refuse)
+        with pytest.raises(InvalidArgumentError, match="no such period"):
+            bench.service.enable(listener, GYRO, 20_000, 0)
+    assert listener.registrations == {}
+    assert bench.service.connections == ()
+    bench.service.enable(listener, GYRO, 20_000, 0)
+    bench.advance_ms(100)
+    assert _taken_ms(listener, GYRO) == [20, 40, 60, 80, 100]

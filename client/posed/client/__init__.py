@@ -1,5 +1,6 @@
 """The SDK: poses and sensor events of a running posed, in Android's vocabulary."""
 
+from posed.client.binding import ServiceState
 from posed.client.event_stream import EventStream
 from posed.client.handler import Handler
 from posed.client.package import HIGH_SAMPLING_RATE_SENSORS, Package
@@ -23,7 +24,6 @@ from posed.client.sensor import (
     TriggerEventListener,
 )
 from posed.client.sensor_manager import SensorManager
-from posed.client.service import ServiceState
 
 __all__ = [
     "HIGH_SAMPLING_RATE_SENSORS",

@@ -4,9 +4,10 @@ import threading
 
 from posed.binder.proxy import Proxy
 from posed.binder.stub import Caller, Stub
+from posed.client.binding import call_back
 from posed.client.handler import Handler
 from posed.client.sensor import DynamicSensorCallback, Sensor
-from posed.client.service import Service, call_back
+from posed.client.service import Service
 from posed.proto import binder_pb2, sensors_pb2
 
 _NAME = "dynamic-sensors"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from posed.binder.stub import Caller, Stub
+from posed.client.binding import call_back
 from posed.client.handler import Handler
 from posed.client.sensor import (
     SENSOR_STATUS_ACCURACY_HIGH,
@@ -16,7 +17,6 @@ from posed.client.sensor import (
     TriggerEvent,
     TriggerEventListener,
 )
-from posed.client.service import call_back
 from posed.proto import events_pb2, sensors_pb2
 
 # Only these carry a status of their own; JNI reports every other type as high (android_hardware_SensorManager.cpp).

@@ -8,10 +8,11 @@ from typing import TypeVar
 
 from posed.binder.proxy import Proxy
 from posed.binder.status import RemoteError
+from posed.client.binding import ServiceState
 from posed.client.event_queue import EventQueue, Registration, SensorEventQueue, TriggerEventQueue
 from posed.client.handler import Handler
 from posed.client.sensor import Sensor, SensorEventListener, TriggerEventListener
-from posed.client.service import Service, ServiceState
+from posed.client.service import Service
 from posed.errors import InvalidStateError
 from posed.proto import sensors_pb2
 

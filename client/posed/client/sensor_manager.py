@@ -6,6 +6,7 @@ from types import TracebackType
 from weakref import WeakSet
 
 from posed.binder.proxy import Proxy
+from posed.client.binding import ServiceState
 from posed.client.dynamic_sensors import DynamicSensors
 from posed.client.event_queue import Registration
 from posed.client.event_stream import EventStream
@@ -19,7 +20,7 @@ from posed.client.sensor import (
     TriggerEventListener,
     period_of_delay_us,
 )
-from posed.client.service import Service, ServiceState
+from posed.client.service import Service
 from posed.errors import InvalidArgumentError, PermissionDeniedError, ServiceUnavailableError
 from posed.proto import binder_pb2, sensors_pb2
 

@@ -7,8 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from enum import Enum
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import zmq
 from google.protobuf.descriptor import ServiceDescriptor
@@ -20,6 +19,7 @@ from posed.binder.runtime import control_path, endpoint, runtime_directory
 from posed.binder.sockets import Context, Socket, context
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
 from posed.binder.stub import Caller, Stub
+from posed.client.binding import Binding, ServiceState, call_back
 from posed.client.launcher import ensure_daemon
 from posed.client.package import Package
 from posed.errors import InvalidStateError, PosedError, ServiceUnavailableError
@@ -34,32 +34,6 @@ _FAREWELL_TIMEOUT_S = 0.3
 # A daemon that answers no call is tried again after this; one that keeps crashing is not started in a tight loop.
 _RETRY_S = 1.0
 _RESTART_INTERVAL_S = 2.0
-
-
-class ServiceState(Enum):
-    """Where a binding stands (android.content.ServiceConnection)."""
-
-    CONNECTING = "connecting"
-    """No daemon has answered yet."""
-    CONNECTED = "connected"
-    DISCONNECTED = "disconnected"
-    """The daemon crashed or was killed; the binding stays and connects again by itself."""
-    BINDING_DIED = "binding died"
-    """The daemon ended on purpose or refused this client; it connects again when one comes that accepts it."""
-    CLOSED = "closed"
-
-
-class Binding(Protocol):
-    """What a client does on its connection; every method is called on the service thread."""
-
-    def bind(self, service: "Service") -> None:
-        """Register with the daemon just connected."""
-
-    def unbind(self, service: "Service") -> None:
-        """Undo `bind` towards a daemon that is still there."""
-
-    def release(self, service: "Service") -> None:
-        """Close what `bind` opened on this side; the daemon may be gone."""
 
 
 class Service:
@@ -345,14 +319,6 @@ class Service:
     def _call_back(self, callback: Callable[..., None] | None, *arguments: Any) -> None:
         if callback is not None:
             call_back(callback, *arguments)
-
-
-def call_back(callback: Callable[..., None], *arguments: Any) -> None:
-    """Call the user's code; what it raises is logged with its name and harms nothing else."""
-    try:
-        callback(*arguments)
-    except Exception:
-        _log.exception("callback %s failed", getattr(callback, "__qualname__", callback))
 
 
 class _ServiceConnection(Stub):

@@ -32,7 +32,8 @@ class SensorSource(Protocol):
     def activate(self, handle: int, enabled: bool) -> None:
         """Switch a sensor on or off; idempotent. Samples not drained when it goes off are abandoned.
 
-        An on-change sensor yields its present value when it goes on. A one-shot sensor is off once it has fired.
+        An on-change sensor yields its present value when it goes on, and then its changes, none sooner than its period
+        after the one before. A one-shot sensor is off once it has fired.
         """
 
     def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:

@@ -64,7 +64,8 @@ class SensorService:
         sampling_period_us: us, 0 = fastest; what the connection's client may ask is the least. max_report_latency_us:
         us, 0 = each event as it happens. decimate: have no more than that period of a continuous sensor delivered,
         whatever others ask; Android has no such thing.
-        Raises InvalidArgumentError for an unknown handle, a negative period or latency, or a sensor it already has.
+        Raises InvalidArgumentError for an unknown handle, a negative period or latency, or a sensor it already has, and
+        what the source raises, without a trace left.
         """
         sensor = self._table[handle]
         if sampling_period_us < 0 or max_report_latency_us < 0:
@@ -83,7 +84,11 @@ class SensorService:
         if decimate and sensor.info.reporting_mode is ReportingMode.CONTINUOUS:
             registration.decimator = Decimator(period_ns)
         self._join(sensor, connection, registration)
-        self._table.request(sensor, (connection, handle), period_ns, max_report_latency_us * 1000)
+        try:
+            self._table.request(sensor, (connection, handle), period_ns, max_report_latency_us * 1000)
+        except PosedError:
+            self._leave(sensor, connection)
+            raise
         if registration.first_flush_pending:
             self._device.flush(handle)
             sensor.flushing.append(connection)
