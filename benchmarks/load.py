@@ -2,6 +2,7 @@
 
 python load.py many COUNT      pose clients at 10 Hz in one process
 python load.py latency         a listener to the raw sensors, each event as it happens, that notes how old they are
+python load.py count NUMBER... listeners at mixed rates in one process, which count what they get
 python load.py first MODE      a pose client that notes when its first pose was published
 python load.py loop deadline|event RECORDING DIRECTORY
                                the daemon's pipeline alone, woken for each pose or for each event
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from posed.cli.profiling.workload import begin
-from posed.client import SENSOR_DELAY_FASTEST, Pose, PoseClient, Sensor, SensorEvent, SensorManager
+from posed.client import SENSOR_DELAY_FASTEST, Package, Pose, PoseClient, Sensor, SensorEvent, SensorManager
 
 _INPUTS = (Sensor.TYPE_ACCELEROMETER, Sensor.TYPE_GYROSCOPE, Sensor.TYPE_MAGNETIC_FIELD)
 
@@ -69,6 +70,43 @@ def latency() -> dict[str, Any]:
         ended.wait()
     ages.sort()
     return {"count": len(ages), "p50_ms": ages[len(ages) // 2] / 1e6, "p99_ms": ages[len(ages) * 99 // 100] / 1e6}
+
+
+def count(numbers: list[int]) -> dict[str, Any]:
+    """Return what each client got: its events, those out of order or twice, and those it knows were dropped."""
+    rates = (*range(4), 100_000)
+    latencies_us = (0, 0, 50_000, 500_000)
+    ended = threading.Event()
+
+    class Counting:
+        def __init__(self, number: int) -> None:
+            self.count = self.disorder = 0
+            self.last: dict[int, int] = {}
+            self.manager = SensorManager(package=Package(f"com.example.client{number:02d}"))
+            sensors = self.manager.get_sensor_list()
+            if number not in (1, 25):  # these have all there are
+                sensors = [sensors[(number + k) % len(sensors)] for k in range(2)]
+            for sensor in sensors:
+                rate, latency_us = rates[number % len(rates)], latencies_us[number % len(latencies_us)]
+                if not self.manager.register_listener(self, sensor, rate, latency_us, decimate=number % 7 == 3):
+                    raise SystemExit(f"client {number} was refused")
+
+        def on_sensor_changed(self, event: SensorEvent) -> None:
+            self.count += 1
+            self.disorder += event.timestamp <= self.last.get(event.sensor.handle, -1)
+            self.last[event.sensor.handle] = event.timestamp
+
+        def result(self) -> dict[str, int]:
+            return {
+                "count": self.count,
+                "disorder": self.disorder,
+                "dropped": self.manager.get_events_dropped(self),
+            }
+
+    clients = {f"com.example.client{number:02d}": Counting(number) for number in numbers}
+    begin(ended.set)
+    ended.wait()
+    return {name: client.result() for name, client in clients.items()}
 
 
 def first(rate_mode: int) -> dict[str, Any]:
@@ -133,6 +171,8 @@ def main() -> int:
         result = many(int(rest[0]))
     elif kind == "latency":
         result = latency()
+    elif kind == "count":
+        result = count([int(number) for number in rest])
     elif kind == "first":
         result = first(int(rest[0]))
     else:

@@ -13,6 +13,14 @@ class InvalidStateError(PosedError):
     """The call does not fit the state things are in."""
 
 
+class PermissionDeniedError(PosedError):
+    """The client lacks a permission that the call needs."""
+
+
+class SourceLostError(PosedError):
+    """What gives the samples is gone: a phone's connection broke, a driver ended. It may come back."""
+
+
 class ProfileError(PosedError):
     """A device profile is malformed."""
 

@@ -20,17 +20,45 @@ STANDARD_GRAVITY = 9.80665
 
 
 class SensorType(IntEnum):
-    """Android's sensor types (hardware/sensors-base.h) that posed offers."""
+    """Android's sensor types (hardware/sensors-base.h); which of them there are is the source's affair."""
 
     ACCELEROMETER = 1
     MAGNETIC_FIELD = 2
+    ORIENTATION = 3
     GYROSCOPE = 4
+    LIGHT = 5
+    PRESSURE = 6
+    TEMPERATURE = 7
+    PROXIMITY = 8
     GRAVITY = 9
     LINEAR_ACCELERATION = 10
     ROTATION_VECTOR = 11
+    RELATIVE_HUMIDITY = 12
+    AMBIENT_TEMPERATURE = 13
     MAGNETIC_FIELD_UNCALIBRATED = 14
+    GAME_ROTATION_VECTOR = 15
     GYROSCOPE_UNCALIBRATED = 16
+    SIGNIFICANT_MOTION = 17
+    STEP_DETECTOR = 18
+    STEP_COUNTER = 19
+    GEOMAGNETIC_ROTATION_VECTOR = 20
+    HEART_RATE = 21
+    TILT_DETECTOR = 22
+    WAKE_GESTURE = 23
+    GLANCE_GESTURE = 24
+    PICK_UP_GESTURE = 25
+    WRIST_TILT_GESTURE = 26
+    DEVICE_ORIENTATION = 27
+    POSE_6DOF = 28
+    STATIONARY_DETECT = 29
+    MOTION_DETECT = 30
+    HEART_BEAT = 31
+    DYNAMIC_SENSOR_META = 32
+    LOW_LATENCY_OFFBODY_DETECT = 34
     ACCELEROMETER_UNCALIBRATED = 35
+    HINGE_ANGLE = 36
+    HEAD_TRACKER = 37
+    HEADING = 42
 
     @property
     def string_type(self) -> str:
@@ -91,6 +119,23 @@ class SensorInfo:
     fifo_max_event_count: int = 0
     reporting_mode: ReportingMode = ReportingMode.CONTINUOUS
     wake_up: bool = False
+    required_permission: str = ""
+    """Android's name of the permission that its events need, such as android.permission.ACTIVITY_RECOGNITION."""
+    is_dynamic: bool = False
+    """True if it came while the phone ran, and may go again."""
+    has_additional_info: bool = False
+    supports_data_injection: bool = False
+
+    @property
+    def flags(self) -> int:
+        """Android's flag bits (hardware/sensors.h): wake-up, reporting mode and what is supported."""
+        bits = (
+            (self.wake_up, 0x1),
+            (self.supports_data_injection, 0x10),
+            (self.is_dynamic, 0x20),
+            (self.has_additional_info, 0x40),
+        )
+        return sum(bit for is_set, bit in bits if is_set) | self.reporting_mode << 1
 
 
 @dataclass(slots=True)
@@ -134,6 +179,10 @@ class EventBatch:
     columns: Mapping[int, EventColumn] = field(default_factory=dict)
     flush_completes: Sequence[int] = ()
     """Handles whose flush completed, in the order asked; each stands behind every event of its handle here."""
+    connected: Sequence[SensorInfo] = ()
+    """Dynamic sensors that came; their handles are new and are never given to another."""
+    disconnected: Sequence[int] = ()
+    """Handles of dynamic sensors that went."""
 
     def __len__(self) -> int:
         return sum(len(column) for column in self.columns.values())

@@ -97,6 +97,18 @@ class Sensors(Stub):
     def getStatistics(self, request: Any, caller: Caller) -> Any:
         return sensors_pb2.Statistics()
 
+    def getDynamicSensorList(self, request: Any, caller: Caller) -> Any:
+        return sensors_pb2.SensorList()
+
+    def registerDynamicSensorCallback(self, request: Any, caller: Caller) -> Any:
+        return EMPTY
+
+    def unregisterDynamicSensorCallback(self, request: Any, caller: Caller) -> Any:
+        return EMPTY
+
+    def dump(self, request: Any, caller: Caller) -> Any:
+        return sensors_pb2.DumpReply()
+
 
 class Listener(Stub):
     """Keeps the sequence numbers of what it is sent."""

@@ -263,7 +263,7 @@ def test_daemon_does_not_wait_for_a_client(server: ServerThread, connection: Con
 def test_interface_version_and_hash_before_get_service(server: ServerThread, unconnected: Connection) -> None:
     pump(unconnected, lambda: unconnected.connected)
     service = unconnected.proxy(SENSORS, "sensorservice")
-    assert service.get_interface_version() == interface_of(SENSORS).version == 1
+    assert service.get_interface_version() == interface_of(SENSORS).version
     assert service.get_interface_hash() == interface_of(SENSORS).hash
 
 

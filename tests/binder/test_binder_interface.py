@@ -69,9 +69,9 @@ def test_older_version_is_accepted_whatever_its_hash() -> None:
 @pytest.mark.parametrize(
     ("version", "hash", "code", "message"),
     [
-        (1, "0" * 64, ExceptionCode.ILLEGAL_STATE, "install the same posed"),
-        (1, "", ExceptionCode.ILLEGAL_STATE, "client none"),
-        (2, SENSORS.hash, ExceptionCode.ILLEGAL_STATE, "restart the daemon"),
+        (SENSORS.version, "0" * 64, ExceptionCode.ILLEGAL_STATE, "install the same posed"),
+        (SENSORS.version, "", ExceptionCode.ILLEGAL_STATE, "client none"),
+        (SENSORS.version + 1, SENSORS.hash, ExceptionCode.ILLEGAL_STATE, "restart the daemon"),
         (2**32 - 1, "", ExceptionCode.ILLEGAL_STATE, "4294967295"),
         (0, SENSORS.hash, ExceptionCode.ILLEGAL_ARGUMENT, "count from 1"),
     ],

@@ -35,12 +35,27 @@ class Desk:
 
     def serve(self, *arguments: str) -> "subprocess.Popen[str]":
         """Run `posed serve` and return it once it is ready."""
+        return self._serve([sys.executable, "-m", "posed.cli", "serve", *arguments])
+
+    def serve_bench_phone(self, profile: str = "patonis2018") -> "subprocess.Popen[str]":
+        """Run a daemon over the phone of bench_phone.py and return it once it is ready."""
+        return self._serve([sys.executable, str(Path(__file__).with_name("bench_phone.py")), profile])
+
+    def tell_phone(self, word: str, is_so: bool) -> None:
+        """Have the bench phone be "lost", or have its "dynamic" sensor."""
+        path = self.directory / word
+        if is_so:
+            path.touch()
+        else:
+            path.unlink()
+
+    def _serve(self, command: list[str]) -> "subprocess.Popen[str]":
         path = self.directory / "notify.sock"
         path.unlink(missing_ok=True)
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as notify:
             notify.bind(str(path))
             notify.settimeout(_PATIENCE_S)
-            daemon = self.spawn([sys.executable, "-m", "posed.cli", "serve", *arguments], {"NOTIFY_SOCKET": str(path)})
+            daemon = self.spawn(command, {"NOTIFY_SOCKET": str(path)})
             assert b"READY=1" in notify.recv(256)
         return daemon
 

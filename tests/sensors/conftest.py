@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from posed.clock import TimeMap, VirtualClock
-from posed.errors import InvalidArgumentError
+from posed.errors import InvalidArgumentError, SourceLostError
 from posed.events import (
     EventBatch,
     EventColumn,
     FilterStatus,
     FlatEvent,
     Orientation,
+    ReportingMode,
     SensorInfo,
     SensorType,
     Truth,
@@ -21,8 +22,35 @@ from posed.events import (
 from posed.sensors import SensorService
 
 
+def _irregular(kind: SensorType, mode: ReportingMode, fifo: int) -> SensorInfo:
+    return SensorInfo(
+        handle=int(kind),
+        type=kind,
+        name=kind.name,
+        vendor="test",
+        version=1,
+        max_range=1000.0,
+        resolution=1.0,
+        power_ma=0.5,
+        min_delay_us=-1 if mode is ReportingMode.ONE_SHOT else 0,
+        max_delay_us=0,
+        fifo_max_event_count=0 if mode is ReportingMode.ONE_SHOT else fifo,
+        reporting_mode=mode,
+    )
+
+
+IRREGULAR = {
+    SensorType.LIGHT: ReportingMode.ON_CHANGE,
+    SensorType.MOTION_DETECT: ReportingMode.ONE_SHOT,
+    SensorType.STEP_DETECTOR: ReportingMode.SPECIAL_TRIGGER,
+}
+
+
 class RegularSource:
-    """Samples at multiples of each sensor's period; notes every call that a HAL would get."""
+    """Samples at multiples of each sensor's period; notes every call that a HAL would get.
+
+    Sensors of other reporting modes report what `happen` says; it can lose and find its phone.
+    """
 
     def __init__(self, types: tuple[SensorType, ...], fifo: int = 10_000) -> None:
         self.sensors = tuple(
@@ -39,8 +67,19 @@ class RegularSource:
                 max_delay_us=200_000,
                 fifo_max_event_count=fifo,
             )
+            if kind not in IRREGULAR
+            else _irregular(kind, IRREGULAR[kind], fifo)
             for kind in types
         )
+        self._modes = {sensor.handle: sensor.reporting_mode for sensor in self.sensors}
+        self._happened: dict[int, list[tuple[int, float]]] = {}
+        self._present: dict[int, float] = {}
+        self.value = 1.0
+        self.is_lost = False
+        self.flush_is_slow = False
+        self.flushes_asked = 0
+        self.connected: tuple[SensorInfo, ...] = ()
+        self.disconnected: tuple[int, ...] = ()
         self.time_map = TimeMap(offset_ns=1_000_000_000)
         self.clock = VirtualClock(self.time_map.offset_ns)
         self.end_ns: int | None = None
@@ -50,34 +89,70 @@ class RegularSource:
         self._flushes: list[int] = []
         self._now_ns = 0
 
+    def happen(self, kind: SensorType, at_ms: float, value: float) -> None:
+        """Have a sensor that is not continuous see something."""
+        self._happened.setdefault(int(kind), []).append((int(at_ms * 1e6), value))
+
+    def lose(self) -> None:
+        """Forget everything and be gone."""
+        self.is_lost = True
+        self._done_ns.clear()
+        self._flushes.clear()
+
+    def _require_phone(self) -> None:
+        if self.is_lost:
+            raise SourceLostError("the phone is gone")
+
     def activate(self, handle: int, enabled: bool) -> None:
+        self._require_phone()
         self.calls.append(("activate", handle, enabled))
         if enabled:
-            self._done_ns[handle] = self._now_ns
+            self._done_ns[handle] = max(self._now_ns, self.time_map.to_sample(self.clock.now_ns()))
+            if self._modes.get(handle) is ReportingMode.ON_CHANGE:
+                self._happened.setdefault(handle, []).append((self._now_ns + 1, self._present.get(handle, 0.0)))
         else:
-            del self._done_ns[handle]
+            self._done_ns.pop(handle, None)
 
     def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:
+        self._require_phone()
         self.calls.append(("batch", handle, sampling_period_ns, max_report_latency_ns))
         self._period_ns[handle] = sampling_period_ns
         return sampling_period_ns
 
     def flush(self, handle: int) -> None:
+        self._require_phone()
         if handle not in self._done_ns:
             raise InvalidArgumentError(f"sensor {handle} is not active")
         self._flushes.append(handle)
+        self.flushes_asked += 1
 
     def drain(self, until_ns: int) -> EventBatch:
+        self._require_phone()
         self._now_ns = until_ns
         columns = {}
-        for handle, done_ns in self._done_ns.items():
+        for handle, done_ns in list(self._done_ns.items()):
+            if self._modes.get(handle, ReportingMode.CONTINUOUS) is not ReportingMode.CONTINUOUS:
+                if seen := [each for each in self._happened.get(handle, []) if done_ns < each[0] <= until_ns]:
+                    columns[handle] = self._irregular_column(handle, sorted(seen))
+                continue
             period = self._period_ns[handle]
             until_ns = until_ns if self.end_ns is None else min(until_ns, self.end_ns)
             times = np.arange(done_ns // period + 1, until_ns // period + 1, dtype=np.int64) * period
-            columns[handle] = EventColumn(times, np.full((len(times), 3), 1.0), np.full(len(times), 3, np.int8))
+            columns[handle] = EventColumn(times, np.full((len(times), 3), self.value), np.full(len(times), 3, np.int8))
             self._done_ns[handle] = until_ns
-        flushes, self._flushes = self._flushes, []
-        return EventBatch(columns, flushes)
+        flushes, self._flushes = ([], self._flushes) if self.flush_is_slow else (self._flushes, [])
+        connected, self.connected = self.connected, ()
+        disconnected, self.disconnected = self.disconnected, ()
+        return EventBatch(columns, flushes, connected, disconnected)
+
+    def _irregular_column(self, handle: int, seen: list[tuple[int, float]]) -> EventColumn:
+        times, values = zip(*seen, strict=True)
+        self._happened[handle] = [each for each in self._happened[handle] if each not in seen]
+        self._present[handle] = values[-1]
+        if self._modes[handle] is ReportingMode.ONE_SHOT:
+            times, values = times[:1], values[:1]
+            del self._done_ns[handle]
+        return EventColumn(np.array(times, np.int64), np.array([values]).T, np.full(len(times), 3, np.int8))
 
     def resume(self) -> None:
         self.calls.append(("resume",))
@@ -85,7 +160,8 @@ class RegularSource:
         self._done_ns = dict.fromkeys(self._done_ns, self._now_ns)
 
     def next_sample_ns(self, handle: int) -> int | None:
-        if handle not in self._done_ns:
+        self._require_phone()
+        if handle not in self._done_ns or self._modes[handle] is not ReportingMode.CONTINUOUS:
             return None
         period = self._period_ns[handle]
         return (self._done_ns[handle] // period + 1) * period

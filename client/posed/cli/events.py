@@ -7,7 +7,7 @@ import queue
 import select
 import sys
 
-from posed.cli.connection import require_daemon
+from posed.cli.connection import PACKAGE, require_daemon
 from posed.cli.options import RATE_MODES, positive_count
 from posed.cli.sensors import short_name, unit
 from posed.client import Sensor, SensorEvent, SensorManager
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Print events until Ctrl-C, --count or the end of the reader."""
     require_daemon()
     try:
-        with SensorManager(on_service_disconnected=_tell_lost, on_binding_died=_tell_ended) as manager:
+        with SensorManager(package=PACKAGE, on_service_disconnected=_tell_lost, on_binding_died=_tell_ended) as manager:
             sensor = find_sensor(arguments.sensor, manager.get_sensor_list())
             listener = _Listener()
             if not manager.register_listener(listener, sensor, arguments.rate, arguments.latency):

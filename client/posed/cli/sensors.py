@@ -7,7 +7,7 @@ from dataclasses import asdict
 from rich.console import Console
 from rich.table import Table
 
-from posed.cli.connection import require_daemon
+from posed.cli.connection import PACKAGE, require_daemon
 from posed.client import Sensor, SensorManager
 
 _UNITS = {
@@ -28,13 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = """\
 Keys of --json, as android.hardware.Sensor has them: handle, type, string_type, name, vendor, version, maximum_range,
 resolution, power (mA), min_delay and max_delay (us), fifo_reserved_event_count, fifo_max_event_count, reporting_mode
-(0 continuous), is_wake_up_sensor."""
+(0 continuous, 1 on-change, 2 one-shot, 3 special trigger), is_wake_up_sensor, is_dynamic_sensor,
+is_additional_info_supported, is_data_injection_supported, id, required_permission."""
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the sensors of the running daemon."""
     require_daemon()
-    with SensorManager() as manager:
+    with SensorManager(package=PACKAGE) as manager:
         sensors = manager.get_sensor_list()
     if arguments.json:
         print(json.dumps([asdict(sensor) for sensor in sensors], indent=2))

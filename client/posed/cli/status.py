@@ -25,8 +25,8 @@ Exit codes: 0 it runs; 3 it does not; 69 it does not answer. Asking does not cou
 Keys of --json: running (the only one if false), pid, version, boot_id, uptime_s, started, bound_clients, connections,
 source, source_ended, profile, filter, runtime_directory, process_cpu_s, wakeups, events_fused, poses_published,
 poses_skipped, lateness_p50_ms, lateness_p99_ms, parcels_refused, sensors (handle, type, name, requested_hz,
-configured_hz, latency_ms, registrations, events), listeners (pid, listener, events_sent, events_dropped,
-events_cached)."""
+configured_hz, latency_ms, registrations, events), listeners (pid, package, listener, events_received, events_sent,
+events_dropped, events_cached)."""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -91,7 +91,9 @@ def _facts(
         "listeners": [
             {
                 "pid": listener.pid,
+                "package": listener.package_name,
                 "listener": listener.listener,
+                "events_received": listener.events_received,
                 "events_sent": listener.events_sent,
                 "events_dropped": listener.events_dropped,
                 "events_cached": listener.events_cached,

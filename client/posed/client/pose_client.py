@@ -12,9 +12,10 @@ from posed.binder.proxy import Proxy
 from posed.binder.runtime import endpoint, pose_path
 from posed.binder.sockets import Socket, sub
 from posed.binder.stub import Caller, Stub
+from posed.client.binding import ServiceState, call_back
 from posed.client.pose import Device, Pose, Truth, boot_time_ns
 from posed.client.sensor import SENSOR_DELAY_GAME, period_of_delay_us
-from posed.client.service import Service, ServiceState, call_back
+from posed.client.service import Service
 from posed.errors import InvalidArgumentError, ServiceUnavailableError
 from posed.proto import pose_pb2
 

@@ -1,46 +1,60 @@
 """SensorManager: Android's way to a phone's sensors (android.hardware.SensorManager)."""
 
 import logging
-import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from itertools import count
 from types import TracebackType
+from weakref import WeakSet
 
 from posed.binder.proxy import Proxy
-from posed.binder.status import RemoteError
-from posed.binder.stub import Caller, Stub
-from posed.client.sensor import Sensor, SensorEvent, SensorEventListener, period_of_delay_us
-from posed.client.service import Service, ServiceState, call_back
-from posed.errors import InvalidArgumentError, ServiceUnavailableError
-from posed.proto import binder_pb2, events_pb2, sensors_pb2
+from posed.client.binding import ServiceState
+from posed.client.dynamic_sensors import DynamicSensors
+from posed.client.event_queue import Registration
+from posed.client.event_stream import EventStream
+from posed.client.handler import Handler
+from posed.client.package import Package
+from posed.client.registry import ListenerRegistry
+from posed.client.sensor import (
+    DynamicSensorCallback,
+    Sensor,
+    SensorEventListener,
+    TriggerEventListener,
+    period_of_delay_us,
+)
+from posed.client.service import Service
+from posed.errors import InvalidArgumentError, PermissionDeniedError, ServiceUnavailableError
+from posed.proto import binder_pb2, sensors_pb2
 
 _log = logging.getLogger(__name__)
 
-# Only these carry a status of their own; JNI reports every other type as high (android_hardware_SensorManager.cpp).
-_TYPES_WITH_STATUS = frozenset((1, 2, 3, 4, 9, 10, 21))
-_ACCURACY_HIGH = 3
-
-
-@dataclass(slots=True)
-class _Registration:
-    sampling_period_us: int
-    max_report_latency_us: int
-
-
-@dataclass(slots=True)
-class _Queue:
-    """One listener: its callback object's name, its sensors, and the last accuracy told of each."""
-
-    name: str
-    listener: SensorEventListener
-    registrations: dict[int, _Registration] = field(default_factory=dict)
-    accuracies: dict[int, int] = field(default_factory=dict)
-    events_dropped: int = 0
+# Those whose default sensor is the one that wakes the phone (SensorManager.getDefaultSensor).
+_WAKE_UP_BY_DEFAULT = frozenset(
+    (
+        Sensor.TYPE_PROXIMITY,
+        Sensor.TYPE_SIGNIFICANT_MOTION,
+        Sensor.TYPE_TILT_DETECTOR,
+        Sensor.TYPE_WAKE_GESTURE,
+        Sensor.TYPE_GLANCE_GESTURE,
+        Sensor.TYPE_PICK_UP_GESTURE,
+        Sensor.TYPE_WRIST_TILT_GESTURE,
+        Sensor.TYPE_DYNAMIC_SENSOR_META,
+        Sensor.TYPE_HINGE_ANGLE,
+    )
+)
+_RATE_CAPPED = frozenset(
+    (
+        Sensor.TYPE_ACCELEROMETER,
+        Sensor.TYPE_MAGNETIC_FIELD,
+        Sensor.TYPE_GYROSCOPE,
+        Sensor.TYPE_ACCELEROMETER_UNCALIBRATED,
+        Sensor.TYPE_MAGNETIC_FIELD_UNCALIBRATED,
+        Sensor.TYPE_GYROSCOPE_UNCALIBRATED,
+    )
+)
+_CAPPED_PERIOD_US = 5_000
 
 
 class SensorManager:
-    """The sensors of a running posed. Callbacks run on a thread of the manager's own.
+    """The sensors of a running posed. Callbacks run on a thread of the manager's own, or on a Handler's.
 
     The registrations survive a daemon that crashes or is restarted: they are made again at the next connection.
     """
@@ -49,23 +63,24 @@ class SensorManager:
         self,
         *,
         auto_create: bool = False,
+        package: Package | None = None,
         on_service_connected: Callable[[], None] | None = None,
         on_service_disconnected: Callable[[], None] | None = None,
         on_binding_died: Callable[[str], None] | None = None,
     ) -> None:
-        self._lock = threading.Lock()
-        self._queues: dict[int, _Queue] = {}
-        self._names = count(1)
-        self._callbacks: set[str] = set()
-        """Names of the callback objects of the connection, which outlive a daemon."""
+        """Bind to the daemon; auto_create starts one if need be. package: what this program says of itself."""
         self._sensors: dict[int, Sensor] = {}
+        self._streams: WeakSet[EventStream] = WeakSet()
         self._service = Service(
             self,
             auto_create=auto_create,
+            package=package,
             on_service_connected=on_service_connected,
             on_service_disconnected=on_service_disconnected,
             on_binding_died=on_binding_died,
         )
+        self._registry = ListenerRegistry(self._service)
+        self._dynamic = DynamicSensors(self._service)
         self._service.start()
 
     def __enter__(self) -> "SensorManager":
@@ -93,15 +108,48 @@ class SensorManager:
         """
         self._service.wait_connected(timeout_s)
 
+    # Which sensors there are
+
     def get_sensor_list(self, sensor_type: int = Sensor.TYPE_ALL) -> list[Sensor]:
-        """Return the sensors of a type, the phone's own first; raises ServiceUnavailableError without a daemon."""
+        """Return the static sensors of a type, the phone's own first.
+
+        Raises ServiceUnavailableError without a daemon.
+        """
         self._service.wait_connected(5.0)
         sensors = list(self._sensors.values())
         return [sensor for sensor in sensors if sensor_type in (Sensor.TYPE_ALL, sensor.type)]
 
-    def get_default_sensor(self, sensor_type: int) -> Sensor | None:
-        """Return the first non-wake-up sensor of a type, None if there is none."""
-        return next((s for s in self.get_sensor_list(sensor_type) if not s.is_wake_up_sensor), None)
+    def get_default_sensor(self, sensor_type: int, wake_up: bool | None = None) -> Sensor | None:
+        """Return the first sensor of a type, None if there is none.
+
+        wake_up: whether it is to be one that wakes the phone; by default as Android has it for the type: so for
+        proximity, significant motion, tilt, the gestures and the hinge, not for the others.
+        """
+        if wake_up is None:
+            wake_up = sensor_type in _WAKE_UP_BY_DEFAULT
+        return next((s for s in self.get_sensor_list(sensor_type) if s.is_wake_up_sensor is wake_up), None)
+
+    def get_dynamic_sensor_list(self, sensor_type: int = Sensor.TYPE_ALL) -> list[Sensor]:
+        """Return the dynamic sensors of a type that are there; raises ServiceUnavailableError without a daemon."""
+        sensors = self._dynamic.sensors()
+        return [sensor for sensor in sensors if sensor_type in (Sensor.TYPE_ALL, sensor.type)]
+
+    def register_dynamic_sensor_callback(
+        self, callback: DynamicSensorCallback | None, handler: Handler | None = None
+    ) -> None:
+        """Have `callback` told of dynamic sensors that come or go from now on; a second time changes nothing.
+
+        Raises InvalidArgumentError without a callback, ServiceUnavailableError if no daemon answers.
+        """
+        if callback is None:
+            raise InvalidArgumentError("register_dynamic_sensor_callback needs a callback, not None")
+        self._dynamic.add(callback, handler)
+
+    def unregister_dynamic_sensor_callback(self, callback: DynamicSensorCallback | None) -> None:
+        """Undo register_dynamic_sensor_callback; one that is not registered, or None, is left alone."""
+        self._dynamic.remove(callback)
+
+    # Events
 
     def register_listener(
         self,
@@ -109,54 +157,106 @@ class SensorManager:
         sensor: Sensor | None,
         sampling_period_us: int,
         max_report_latency_us: int = 0,
+        *,
+        handler: Handler | None = None,
+        decimate: bool = False,
     ) -> bool:
         """Begin events of a sensor for a listener; `sampling_period_us` is a SENSOR_DELAY code or a period in us.
 
-        Returns False, as Android does, for a missing listener or sensor, a negative period or latency, or a sensor the
-        listener already has. Raises ServiceUnavailableError if no daemon answers.
+        handler: where the callbacks run, on a thread of the manager's own by default; what a listener's first
+        registration says holds for all. decimate: have no more than the period asked delivered, whatever other
+        listeners ask; an extension of posed's, for Android delivers to all what the fastest asks.
+
+        Returns False, as Android does, for a missing listener or sensor, a one-shot sensor, a negative period or
+        latency, or a sensor the listener already has, whose rate is not changed by it. Raises InvalidStateError beyond
+        128 listeners, PermissionDeniedError for a debuggable package that asks for more than 200 Hz and may not have
+        it, ServiceUnavailableError if no daemon answers.
         """
         if listener is None or sensor is None:
             _log.error("register_listener needs a listener and a sensor")
             return False
+        if sensor.reporting_mode == Sensor.REPORTING_MODE_ONE_SHOT:
+            _log.error("%s is a one-shot sensor: use request_trigger_sensor", sensor.name)
+            return False
         period_us = period_of_delay_us(sampling_period_us)
         if period_us < 0 or max_report_latency_us < 0:
+            _log.error("sampling period %d us and latency %d us must not be negative", period_us, max_report_latency_us)
             return False
-        return self._service.run(lambda: self._register(listener, sensor, period_us, max_report_latency_us))
+        self._check_rate(sensor, period_us)
+        registration = Registration(sensor, period_us, max_report_latency_us, decimate)
+        return self._registry.register(listener, registration, handler)
 
     def unregister_listener(self, listener: SensorEventListener | None, sensor: Sensor | None = None) -> None:
-        """End events of one sensor, or of all, for a listener; what is still queued is dropped."""
-        if listener is None:
-            return
-        with self._lock:
-            queue = self._queues.get(id(listener))
-            if queue is None:
-                return
-            handles = [sensor.handle] if sensor is not None else list(queue.registrations)
-            gone = [handle for handle in handles if queue.registrations.pop(handle, None) is not None]
-            if not queue.registrations:
-                del self._queues[id(listener)]
-        if self.state is ServiceState.CONNECTED:
-            try:
-                self._service.run(lambda: self._unregister(queue, gone))
-            except ServiceUnavailableError as error:
-                _log.debug("unregistered by the daemon's going: %s", error)
+        """End events of one sensor, or of all, for a listener; what is still queued is dropped.
 
-    def flush(self, listener: SensorEventListener) -> bool:
+        A one-shot sensor is left alone: use cancel_trigger_sensor.
+        """
+        if listener is None or (sensor is not None and sensor.reporting_mode == Sensor.REPORTING_MODE_ONE_SHOT):
+            return
+        try:
+            self._registry.unregister(listener, sensor)
+        except ServiceUnavailableError as error:
+            _log.debug("unregistered by the daemon's going: %s", error)
+
+    def flush(self, listener: SensorEventListener | None) -> bool:
         """Ask for on_flush_completed(sensor) once for each of the listener's sensors.
 
-        Returns False if it has none or the daemon refuses. Raises ServiceUnavailableError if no daemon answers.
+        Returns False if it has none or one of them cannot be flushed. Raises InvalidArgumentError without a listener,
+        ServiceUnavailableError if no daemon answers.
         """
         if listener is None:
             raise InvalidArgumentError("flush needs a listener, not None")
-        queue = self._queues.get(id(listener))
-        if queue is None:
+        return self._registry.flush(listener)
+
+    def request_trigger_sensor(self, listener: TriggerEventListener | None, sensor: Sensor | None) -> bool:
+        """Have `listener.on_trigger` called once, when a one-shot sensor fires; the request is over before the call.
+
+        Returns False if the sensor is not one-shot, or the listener waits for it already. Raises InvalidArgumentError
+        without a listener or sensor, InvalidStateError beyond 128 listeners, ServiceUnavailableError if no daemon
+        answers.
+        """
+        if listener is None or sensor is None:
+            raise InvalidArgumentError("request_trigger_sensor needs a listener and a sensor, not None")
+        if sensor.reporting_mode != Sensor.REPORTING_MODE_ONE_SHOT:
+            return False
+        return self._registry.request_trigger(listener, Registration(sensor, 0, 0))
+
+    def cancel_trigger_sensor(self, listener: TriggerEventListener | None, sensor: Sensor | None = None) -> bool:
+        """Undo request_trigger_sensor for one sensor, or for all; True if a pending request was removed."""
+        if sensor is not None and sensor.reporting_mode != Sensor.REPORTING_MODE_ONE_SHOT:
             return False
         try:
-            self._service.run(lambda: self._sensor_service.flush(sensors_pb2.FlushRequest(listener=queue.name)))
-        except RemoteError as error:
-            _log.error("cannot flush: %s", error)
-            return False
-        return True
+            return self._registry.cancel_trigger(listener, sensor)
+        except ServiceUnavailableError as error:
+            _log.debug("cancelled by the daemon's going: %s", error)
+            return True
+
+    def stream(
+        self,
+        sensor: Sensor | None,
+        sampling_period_us: int,
+        max_report_latency_us: int = 0,
+        *,
+        decimate: bool = False,
+    ) -> EventStream:
+        """Return events of a sensor to iterate over with `for` or `async for`; parameters as register_listener's.
+
+        Raises InvalidArgumentError if the sensor is None or what is asked is refused.
+        """
+        stream = EventStream(self)
+        if not self.register_listener(stream, sensor, sampling_period_us, max_report_latency_us, decimate=decimate):
+            raise InvalidArgumentError(
+                f"no events of {sensor.name if sensor else 'no sensor'} every {sampling_period_us} us with a latency of"
+                f" {max_report_latency_us} us: the phone may lack it, or it is a one-shot sensor"
+            )
+        self._streams.add(stream)
+        return stream
+
+    def get_events_dropped(self, listener: SensorEventListener) -> int:
+        """Return how many events were dropped, oldest first, because the listener was too slow. Not in Android."""
+        return self._registry.events_dropped(listener)
+
+    # The daemon
 
     def get_statistics(self) -> sensors_pb2.Statistics:
         """Return the daemon's counters; raises ServiceUnavailableError if no daemon answers."""
@@ -168,28 +268,19 @@ class SensorManager:
     def close(self) -> None:
         """End all events and unbind. Never takes longer than a second."""
         self._service.close()
+        for stream in list(self._streams):
+            stream.end()
 
     # Binding, on the service thread
 
     def bind(self, service: Service) -> None:
-        """Read the sensor list and restore the registrations."""
+        """Read the sensor lists and restore the registrations."""
         self._sensor_service: Proxy
-        self._sensor_service, _ = service.get_service("sensorservice", _SENSOR_SERVICE)
+        self._sensor_service, boot_id = service.get_service("sensorservice", _SENSOR_SERVICE)
         found = self._sensor_service.getSensorList(binder_pb2.Empty()).sensors
         self._sensors = {message.handle: Sensor.of_message(message) for message in found}
-        with self._lock:
-            queues = list(self._queues.values())
-        for name in self._callbacks - {queue.name for queue in queues}:
-            self._remove_callback(name)
-        for queue in queues:
-            queue.accuracies.clear()
-            for handle, registration in list(queue.registrations.items()):
-                try:
-                    self._enable(queue, handle, registration)
-                except RemoteError as error:
-                    # The daemon that returned may have another phone: what it lacks is no reason to lose the rest.
-                    _log.error("sensor %d of %s is not registered any more: %s", handle, queue.name, error)
-                    queue.registrations.pop(handle, None)
+        self._registry.restore(self._sensor_service, self._sensors)
+        self._dynamic.restore(self._sensor_service, boot_id)
 
     def unbind(self, service: Service) -> None:
         """Nothing to undo: the daemon frees a connection's registrations when it closes."""
@@ -197,92 +288,18 @@ class SensorManager:
     def release(self, service: Service) -> None:
         """Nothing is open on this side."""
 
-    def _register(
-        self, listener: SensorEventListener, sensor: Sensor, sampling_period_us: int, max_report_latency_us: int
-    ) -> bool:
-        with self._lock:
-            queue = self._queues.get(id(listener)) or _Queue(f"listener-{next(self._names)}", listener)
-            if sensor.handle in queue.registrations:
-                return False
-        registration = _Registration(sampling_period_us, max_report_latency_us)
-        if queue.name not in self._callbacks:
-            self._service.connection.add_callback(queue.name, _Listener(self, queue))
-            self._callbacks.add(queue.name)
-        try:
-            self._enable(queue, sensor.handle, registration)
-        except RemoteError as error:
-            _log.error("cannot register %s: %s", sensor.name, error)
-            if not queue.registrations:
-                self._remove_callback(queue.name)
-            return False
-        with self._lock:
-            queue.registrations[sensor.handle] = registration
-            self._queues[id(listener)] = queue
-        return True
-
-    def _enable(self, queue: _Queue, handle: int, registration: _Registration) -> None:
-        self._sensor_service.enableSensor(
-            sensors_pb2.EnableSensorRequest(
-                listener=queue.name,
-                handle=handle,
-                sampling_period_us=registration.sampling_period_us,
-                max_report_latency_us=registration.max_report_latency_us,
+    def _check_rate(self, sensor: Sensor, sampling_period_us: int) -> None:
+        package = self._service.package
+        if (
+            package.debuggable
+            and package.is_rate_capped
+            and sampling_period_us < _CAPPED_PERIOD_US
+            and sensor.type in _RATE_CAPPED
+        ):
+            raise PermissionDeniedError(
+                f"To use the sampling rate of {sampling_period_us} microseconds, app needs to declare the normal"
+                " permission HIGH_SAMPLING_RATE_SENSORS: give the SensorManager a Package with it"
             )
-        )
-
-    def _unregister(self, queue: _Queue, handles: list[int]) -> None:
-        for handle in handles:
-            self._sensor_service.disableSensor(sensors_pb2.DisableSensorRequest(listener=queue.name, handle=handle))
-        if not queue.registrations:
-            self._remove_callback(queue.name)
-
-    def _remove_callback(self, name: str) -> None:
-        self._service.connection.remove_callback(name)
-        self._callbacks.discard(name)
-
-    def _dispatch(self, queue: _Queue, batch: events_pb2.SensorEvents) -> None:
-        """Call the listener for each event in time order, then for the flushes behind them."""
-        queue.events_dropped = batch.events_dropped
-        events: list[tuple[int, int, tuple[float, ...], int]] = []
-        for column in batch.columns:
-            values = tuple(column.values)
-            width = len(values) // max(1, len(column.timestamp_ns))
-            accuracies = column.accuracy if len(column.accuracy) > 1 else (*column.accuracy,) * len(column.timestamp_ns)
-            for row, (timestamp_ns, accuracy) in enumerate(zip(column.timestamp_ns, accuracies, strict=True)):
-                events.append((timestamp_ns, column.handle, values[row * width : (row + 1) * width], accuracy))
-        events.sort(key=lambda event: event[:2])
-        for timestamp_ns, handle, values, accuracy in events:
-            sensor = self._sensors.get(handle)
-            # An event still on its way when its sensor was unregistered is dropped, as in Android.
-            if sensor is not None and handle in queue.registrations:
-                self._deliver(queue, sensor, timestamp_ns, values, accuracy)
-        on_flush_completed = getattr(queue.listener, "on_flush_completed", None)
-        for handle in batch.flush_completes:
-            if on_flush_completed is not None and handle in self._sensors:
-                call_back(on_flush_completed, self._sensors[handle])
-
-    def _deliver(
-        self, queue: _Queue, sensor: Sensor, timestamp_ns: int, values: tuple[float, ...], accuracy: int
-    ) -> None:
-        if sensor.type not in _TYPES_WITH_STATUS:
-            accuracy = _ACCURACY_HIGH
-        if accuracy >= 0 and accuracy != queue.accuracies.get(sensor.handle, 0):
-            queue.accuracies[sensor.handle] = accuracy
-            on_accuracy_changed = getattr(queue.listener, "on_accuracy_changed", None)
-            if on_accuracy_changed is not None:
-                call_back(on_accuracy_changed, sensor, accuracy)
-        call_back(queue.listener.on_sensor_changed, SensorEvent(sensor, timestamp_ns, values, accuracy))
-
-
-class _Listener(Stub):
-    descriptor = sensors_pb2.DESCRIPTOR.services_by_name["ISensorEventListener"]
-
-    def __init__(self, manager: SensorManager, queue: _Queue) -> None:
-        self._manager = manager
-        self._queue = queue
-
-    def onSensorEvents(self, request: events_pb2.SensorEvents, caller: Caller) -> None:
-        self._manager._dispatch(self._queue, request)
 
 
 _SENSOR_SERVICE = sensors_pb2.DESCRIPTOR.services_by_name["ISensorService"]

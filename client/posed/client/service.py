@@ -7,8 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from enum import Enum
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 import zmq
 from google.protobuf.descriptor import ServiceDescriptor
@@ -20,7 +19,9 @@ from posed.binder.runtime import control_path, endpoint, runtime_directory
 from posed.binder.sockets import Context, Socket, context
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
 from posed.binder.stub import Caller, Stub
+from posed.client.binding import Binding, ServiceState, call_back
 from posed.client.launcher import ensure_daemon
+from posed.client.package import Package
 from posed.errors import InvalidStateError, PosedError, ServiceUnavailableError
 from posed.proto import binder_pb2, service_manager_pb2
 
@@ -35,32 +36,6 @@ _RETRY_S = 1.0
 _RESTART_INTERVAL_S = 2.0
 
 
-class ServiceState(Enum):
-    """Where a binding stands (android.content.ServiceConnection)."""
-
-    CONNECTING = "connecting"
-    """No daemon has answered yet."""
-    CONNECTED = "connected"
-    DISCONNECTED = "disconnected"
-    """The daemon crashed or was killed; the binding stays and connects again by itself."""
-    BINDING_DIED = "binding died"
-    """The daemon ended on purpose or refused this client; it connects again when one comes that accepts it."""
-    CLOSED = "closed"
-
-
-class Binding(Protocol):
-    """What a client does on its connection; every method is called on the service thread."""
-
-    def bind(self, service: "Service") -> None:
-        """Register with the daemon just connected."""
-
-    def unbind(self, service: "Service") -> None:
-        """Undo `bind` towards a daemon that is still there."""
-
-    def release(self, service: "Service") -> None:
-        """Close what `bind` opened on this side; the daemon may be gone."""
-
-
 class Service:
     """One client's binding to the daemon, kept by a thread of its own until `close`."""
 
@@ -69,12 +44,15 @@ class Service:
         binding: Binding,
         *,
         auto_create: bool,
+        package: Package | None = None,
         on_service_connected: Callable[[], None] | None = None,
         on_service_disconnected: Callable[[], None] | None = None,
         on_binding_died: Callable[[str], None] | None = None,
     ) -> None:
         self._binding = binding
         self._auto_create = auto_create
+        self.package = package or Package()
+        """What this program says of itself when it binds."""
         self._on_connected = on_service_connected
         self._on_disconnected = on_service_disconnected
         self._on_died = on_binding_died
@@ -272,7 +250,13 @@ class Service:
         self._retry_at = None
         try:
             self._manager().bindService(
-                service_manager_pb2.BindRequest(auto_create=self._auto_create, connection="connection")
+                service_manager_pb2.BindRequest(
+                    auto_create=self._auto_create,
+                    connection="connection",
+                    package_name=self.package.name,
+                    target_sdk=self.package.target_sdk,
+                    permissions=self.package.permissions,
+                )
             )
             self._binding.bind(self)
         except DeadObjectError:
@@ -335,14 +319,6 @@ class Service:
     def _call_back(self, callback: Callable[..., None] | None, *arguments: Any) -> None:
         if callback is not None:
             call_back(callback, *arguments)
-
-
-def call_back(callback: Callable[..., None], *arguments: Any) -> None:
-    """Call the user's code; what it raises is logged with its name and harms nothing else."""
-    try:
-        callback(*arguments)
-    except Exception:
-        _log.exception("callback %s failed", getattr(callback, "__qualname__", callback))
 
 
 class _ServiceConnection(Stub):

@@ -4,10 +4,11 @@ Kept, not computed at run time: hashlib loads OpenSSL, 3.5 MB of every process t
 """
 
 HASHES = {
-    "posed.IServiceManager": "f4172856b07360238841d2268929627911abf5fc781ea07e8ad22499ba5d6a4d",
-    "posed.IServiceConnection": "f4172856b07360238841d2268929627911abf5fc781ea07e8ad22499ba5d6a4d",
-    "posed.ISensorService": "6f8325bc6e6bf18eaaf3c2753bcfd7f2e6c266785cf6e76880c2052d367def33",
-    "posed.ISensorEventListener": "6f8325bc6e6bf18eaaf3c2753bcfd7f2e6c266785cf6e76880c2052d367def33",
+    "posed.IServiceManager": "1b84acd63e36734699d3e8176cad81210c2b81e89922166ea5d88a4385bd8465",
+    "posed.IServiceConnection": "1b84acd63e36734699d3e8176cad81210c2b81e89922166ea5d88a4385bd8465",
+    "posed.ISensorService": "6e6cd87282fcbb517a5fc89f1bb73c73037e6eb558f266c6b92c1e7232776713",
+    "posed.ISensorEventListener": "6e6cd87282fcbb517a5fc89f1bb73c73037e6eb558f266c6b92c1e7232776713",
+    "posed.IDynamicSensorCallback": "6e6cd87282fcbb517a5fc89f1bb73c73037e6eb558f266c6b92c1e7232776713",
     "posed.IPoseService": "a316e4d9941478d93958efd2ec6a4bdffaf02cd70d29fc7db136453d83949bbf",
     "posed.IPoseListener": "a316e4d9941478d93958efd2ec6a4bdffaf02cd70d29fc7db136453d83949bbf",
 }

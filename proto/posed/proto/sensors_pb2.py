@@ -26,7 +26,7 @@ from posed.proto import binder_pb2 as posed_dot_proto_dot_binder__pb2
 from posed.proto import events_pb2 as posed_dot_proto_dot_events__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x19posed/proto/sensors.proto\x12\x05posed\x1a\x18posed/proto/binder.proto\x1a\x18posed/proto/events.proto\"0\n\nSensorList\x12\"\n\x07sensors\x18\x01 \x03(\x0b\x32\x11.posed.SensorInfo\"\xbd\x02\n\nSensorInfo\x12\x0e\n\x06handle\x18\x01 \x01(\x05\x12\x0c\n\x04type\x18\x02 \x01(\x05\x12\x13\n\x0bstring_type\x18\x03 \x01(\t\x12\x0c\n\x04name\x18\x04 \x01(\t\x12\x0e\n\x06vendor\x18\x05 \x01(\t\x12\x0f\n\x07version\x18\x06 \x01(\x05\x12\x11\n\tmax_range\x18\x07 \x01(\x01\x12\x12\n\nresolution\x18\x08 \x01(\x01\x12\x10\n\x08power_ma\x18\t \x01(\x01\x12\x14\n\x0cmin_delay_us\x18\n \x01(\x05\x12\x14\n\x0cmax_delay_us\x18\x0b \x01(\x05\x12!\n\x19\x66ifo_reserved_event_count\x18\x0c \x01(\r\x12\x1c\n\x14\x66ifo_max_event_count\x18\r \x01(\r\x12\x16\n\x0ereporting_mode\x18\x0e \x01(\x05\x12\x0f\n\x07wake_up\x18\x0f \x01(\x08\"r\n\x13\x45nableSensorRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\x12\x0e\n\x06handle\x18\x02 \x01(\x05\x12\x1a\n\x12sampling_period_us\x18\x03 \x01(\x05\x12\x1d\n\x15max_report_latency_us\x18\x04 \x01(\x03\"8\n\x14\x44isableSensorRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\x12\x0e\n\x06handle\x18\x02 \x01(\x05\" \n\x0c\x46lushRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\"\xf8\x02\n\nStatistics\x12\x14\n\x0ctimestamp_ns\x18\x01 \x01(\x12\x12\x16\n\x0eprocess_cpu_ns\x18\x02 \x01(\x04\x12\x15\n\rsource_cpu_ns\x18\x03 \x01(\x04\x12\x15\n\rfilter_cpu_ns\x18\x04 \x01(\x04\x12\x0f\n\x07wakeups\x18\x05 \x01(\x04\x12\x14\n\x0c\x65vents_fused\x18\x06 \x01(\x04\x12\x17\n\x0fposes_published\x18\x07 \x01(\x04\x12\x15\n\rposes_skipped\x18\x08 \x01(\x04\x12\x17\n\x0flateness_p50_ms\x18\t \x01(\x01\x12\x17\n\x0flateness_p99_ms\x18\n \x01(\x01\x12(\n\x07sensors\x18\x0b \x03(\x0b\x32\x17.posed.SensorStatistics\x12,\n\tlisteners\x18\x0c \x03(\x0b\x32\x19.posed.ListenerStatistics\x12\x17\n\x0fparcels_refused\x18\r \x01(\x04\x12\x14\n\x0csource_ended\x18\x0e \x01(\x08\"\xa3\x01\n\x10SensorStatistics\x12\x0e\n\x06handle\x18\x01 \x01(\x05\x12\x1b\n\x13requested_period_us\x18\x02 \x01(\x05\x12\x1c\n\x14\x63onfigured_period_ns\x18\x03 \x01(\x03\x12\x1d\n\x15max_report_latency_us\x18\x04 \x01(\x03\x12\x15\n\rregistrations\x18\x05 \x01(\r\x12\x0e\n\x06\x65vents\x18\x06 \x01(\x04\"\x84\x01\n\x12ListenerStatistics\x12\x0b\n\x03uid\x18\x01 \x01(\r\x12\x0b\n\x03pid\x18\x02 \x01(\r\x12\x10\n\x08listener\x18\x03 \x01(\t\x12\x13\n\x0b\x65vents_sent\x18\x04 \x01(\x04\x12\x16\n\x0e\x65vents_dropped\x18\x05 \x01(\x04\x12\x15\n\revents_cached\x18\x06 \x01(\r2\x9c\x02\n\x0eISensorService\x12\x30\n\rgetSensorList\x12\x0c.posed.Empty\x1a\x11.posed.SensorList\x12\x38\n\x0c\x65nableSensor\x12\x1a.posed.EnableSensorRequest\x1a\x0c.posed.Empty\x12:\n\rdisableSensor\x12\x1b.posed.DisableSensorRequest\x1a\x0c.posed.Empty\x12*\n\x05\x66lush\x12\x13.posed.FlushRequest\x1a\x0c.posed.Empty\x12\x30\n\rgetStatistics\x12\x0c.posed.Empty\x1a\x11.posed.Statistics\x1a\x04\x88\xb5\x18\x01\x32W\n\x14ISensorEventListener\x12\x39\n\x0eonSensorEvents\x12\x13.posed.SensorEvents\x1a\x0c.posed.Empty\"\x04\x88\xb5\x18\x01\x1a\x04\x88\xb5\x18\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x19posed/proto/sensors.proto\x12\x05posed\x1a\x18posed/proto/binder.proto\x1a\x18posed/proto/events.proto\"0\n\nSensorList\x12\"\n\x07sensors\x18\x01 \x03(\x0b\x32\x11.posed.SensorInfo\"\xb8\x03\n\nSensorInfo\x12\x0e\n\x06handle\x18\x01 \x01(\x05\x12\x0c\n\x04type\x18\x02 \x01(\x05\x12\x13\n\x0bstring_type\x18\x03 \x01(\t\x12\x0c\n\x04name\x18\x04 \x01(\t\x12\x0e\n\x06vendor\x18\x05 \x01(\t\x12\x0f\n\x07version\x18\x06 \x01(\x05\x12\x11\n\tmax_range\x18\x07 \x01(\x01\x12\x12\n\nresolution\x18\x08 \x01(\x01\x12\x10\n\x08power_ma\x18\t \x01(\x01\x12\x14\n\x0cmin_delay_us\x18\n \x01(\x05\x12\x14\n\x0cmax_delay_us\x18\x0b \x01(\x05\x12!\n\x19\x66ifo_reserved_event_count\x18\x0c \x01(\r\x12\x1c\n\x14\x66ifo_max_event_count\x18\r \x01(\r\x12\x16\n\x0ereporting_mode\x18\x0e \x01(\x05\x12\x0f\n\x07wake_up\x18\x0f \x01(\x08\x12\x1b\n\x13required_permission\x18\x10 \x01(\t\x12\x12\n\nis_dynamic\x18\x11 \x01(\x08\x12\x1b\n\x13has_additional_info\x18\x12 \x01(\x08\x12\x1f\n\x17supports_data_injection\x18\x13 \x01(\x08\x12\n\n\x02id\x18\x14 \x01(\x05\"\x84\x01\n\x13\x45nableSensorRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\x12\x0e\n\x06handle\x18\x02 \x01(\x05\x12\x1a\n\x12sampling_period_us\x18\x03 \x01(\x05\x12\x1d\n\x15max_report_latency_us\x18\x04 \x01(\x03\x12\x10\n\x08\x64\x65\x63imate\x18\x05 \x01(\x08\"8\n\x14\x44isableSensorRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\x12\x0e\n\x06handle\x18\x02 \x01(\x05\" \n\x0c\x46lushRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\"0\n\x1c\x44ynamicSensorCallbackRequest\x12\x10\n\x08\x63\x61llback\x18\x01 \x01(\t\"\x1d\n\x0b\x44umpRequest\x12\x0e\n\x06offset\x18\x01 \x01(\r\"\'\n\tDumpReply\x12\x0c\n\x04text\x18\x01 \x01(\t\x12\x0c\n\x04more\x18\x02 \x01(\x08\"\xf8\x02\n\nStatistics\x12\x14\n\x0ctimestamp_ns\x18\x01 \x01(\x12\x12\x16\n\x0eprocess_cpu_ns\x18\x02 \x01(\x04\x12\x15\n\rsource_cpu_ns\x18\x03 \x01(\x04\x12\x15\n\rfilter_cpu_ns\x18\x04 \x01(\x04\x12\x0f\n\x07wakeups\x18\x05 \x01(\x04\x12\x14\n\x0c\x65vents_fused\x18\x06 \x01(\x04\x12\x17\n\x0fposes_published\x18\x07 \x01(\x04\x12\x15\n\rposes_skipped\x18\x08 \x01(\x04\x12\x17\n\x0flateness_p50_ms\x18\t \x01(\x01\x12\x17\n\x0flateness_p99_ms\x18\n \x01(\x01\x12(\n\x07sensors\x18\x0b \x03(\x0b\x32\x17.posed.SensorStatistics\x12,\n\tlisteners\x18\x0c \x03(\x0b\x32\x19.posed.ListenerStatistics\x12\x17\n\x0fparcels_refused\x18\r \x01(\x04\x12\x14\n\x0csource_ended\x18\x0e \x01(\x08\"\xa3\x01\n\x10SensorStatistics\x12\x0e\n\x06handle\x18\x01 \x01(\x05\x12\x1b\n\x13requested_period_us\x18\x02 \x01(\x05\x12\x1c\n\x14\x63onfigured_period_ns\x18\x03 \x01(\x03\x12\x1d\n\x15max_report_latency_us\x18\x04 \x01(\x03\x12\x15\n\rregistrations\x18\x05 \x01(\r\x12\x0e\n\x06\x65vents\x18\x06 \x01(\x04\"\xb3\x01\n\x12ListenerStatistics\x12\x0b\n\x03uid\x18\x01 \x01(\r\x12\x0b\n\x03pid\x18\x02 \x01(\r\x12\x10\n\x08listener\x18\x03 \x01(\t\x12\x13\n\x0b\x65vents_sent\x18\x04 \x01(\x04\x12\x16\n\x0e\x65vents_dropped\x18\x05 \x01(\x04\x12\x15\n\revents_cached\x18\x06 \x01(\r\x12\x14\n\x0cpackage_name\x18\x07 \x01(\t\x12\x17\n\x0f\x65vents_received\x18\x08 \x01(\x04\x32\xad\x04\n\x0eISensorService\x12\x30\n\rgetSensorList\x12\x0c.posed.Empty\x1a\x11.posed.SensorList\x12\x38\n\x0c\x65nableSensor\x12\x1a.posed.EnableSensorRequest\x1a\x0c.posed.Empty\x12:\n\rdisableSensor\x12\x1b.posed.DisableSensorRequest\x1a\x0c.posed.Empty\x12*\n\x05\x66lush\x12\x13.posed.FlushRequest\x1a\x0c.posed.Empty\x12\x30\n\rgetStatistics\x12\x0c.posed.Empty\x1a\x11.posed.Statistics\x12\x37\n\x14getDynamicSensorList\x12\x0c.posed.Empty\x1a\x11.posed.SensorList\x12R\n\x1dregisterDynamicSensorCallback\x12#.posed.DynamicSensorCallbackRequest\x1a\x0c.posed.Empty\x12T\n\x1funregisterDynamicSensorCallback\x12#.posed.DynamicSensorCallbackRequest\x1a\x0c.posed.Empty\x12,\n\x04\x64ump\x12\x12.posed.DumpRequest\x1a\x10.posed.DumpReply\x1a\x04\x88\xb5\x18\x02\x32W\n\x14ISensorEventListener\x12\x39\n\x0eonSensorEvents\x12\x13.posed.SensorEvents\x1a\x0c.posed.Empty\"\x04\x88\xb5\x18\x01\x1a\x04\x88\xb5\x18\x02\x32`\n\x16IDynamicSensorCallback\x12@\n\x17onDynamicSensorsChanged\x12\x11.posed.SensorList\x1a\x0c.posed.Empty\"\x04\x88\xb5\x18\x01\x1a\x04\x88\xb5\x18\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,29 +34,41 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'posed.proto.sensors_pb2', _
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_ISENSORSERVICE']._loaded_options = None
-  _globals['_ISENSORSERVICE']._serialized_options = b'\210\265\030\001'
+  _globals['_ISENSORSERVICE']._serialized_options = b'\210\265\030\002'
   _globals['_ISENSOREVENTLISTENER']._loaded_options = None
-  _globals['_ISENSOREVENTLISTENER']._serialized_options = b'\210\265\030\001'
+  _globals['_ISENSOREVENTLISTENER']._serialized_options = b'\210\265\030\002'
   _globals['_ISENSOREVENTLISTENER'].methods_by_name['onSensorEvents']._loaded_options = None
   _globals['_ISENSOREVENTLISTENER'].methods_by_name['onSensorEvents']._serialized_options = b'\210\265\030\001'
+  _globals['_IDYNAMICSENSORCALLBACK']._loaded_options = None
+  _globals['_IDYNAMICSENSORCALLBACK']._serialized_options = b'\210\265\030\001'
+  _globals['_IDYNAMICSENSORCALLBACK'].methods_by_name['onDynamicSensorsChanged']._loaded_options = None
+  _globals['_IDYNAMICSENSORCALLBACK'].methods_by_name['onDynamicSensorsChanged']._serialized_options = b'\210\265\030\001'
   _globals['_SENSORLIST']._serialized_start=88
   _globals['_SENSORLIST']._serialized_end=136
   _globals['_SENSORINFO']._serialized_start=139
-  _globals['_SENSORINFO']._serialized_end=456
-  _globals['_ENABLESENSORREQUEST']._serialized_start=458
-  _globals['_ENABLESENSORREQUEST']._serialized_end=572
-  _globals['_DISABLESENSORREQUEST']._serialized_start=574
-  _globals['_DISABLESENSORREQUEST']._serialized_end=630
-  _globals['_FLUSHREQUEST']._serialized_start=632
-  _globals['_FLUSHREQUEST']._serialized_end=664
-  _globals['_STATISTICS']._serialized_start=667
-  _globals['_STATISTICS']._serialized_end=1043
-  _globals['_SENSORSTATISTICS']._serialized_start=1046
-  _globals['_SENSORSTATISTICS']._serialized_end=1209
-  _globals['_LISTENERSTATISTICS']._serialized_start=1212
-  _globals['_LISTENERSTATISTICS']._serialized_end=1344
-  _globals['_ISENSORSERVICE']._serialized_start=1347
-  _globals['_ISENSORSERVICE']._serialized_end=1631
-  _globals['_ISENSOREVENTLISTENER']._serialized_start=1633
-  _globals['_ISENSOREVENTLISTENER']._serialized_end=1720
+  _globals['_SENSORINFO']._serialized_end=579
+  _globals['_ENABLESENSORREQUEST']._serialized_start=582
+  _globals['_ENABLESENSORREQUEST']._serialized_end=714
+  _globals['_DISABLESENSORREQUEST']._serialized_start=716
+  _globals['_DISABLESENSORREQUEST']._serialized_end=772
+  _globals['_FLUSHREQUEST']._serialized_start=774
+  _globals['_FLUSHREQUEST']._serialized_end=806
+  _globals['_DYNAMICSENSORCALLBACKREQUEST']._serialized_start=808
+  _globals['_DYNAMICSENSORCALLBACKREQUEST']._serialized_end=856
+  _globals['_DUMPREQUEST']._serialized_start=858
+  _globals['_DUMPREQUEST']._serialized_end=887
+  _globals['_DUMPREPLY']._serialized_start=889
+  _globals['_DUMPREPLY']._serialized_end=928
+  _globals['_STATISTICS']._serialized_start=931
+  _globals['_STATISTICS']._serialized_end=1307
+  _globals['_SENSORSTATISTICS']._serialized_start=1310
+  _globals['_SENSORSTATISTICS']._serialized_end=1473
+  _globals['_LISTENERSTATISTICS']._serialized_start=1476
+  _globals['_LISTENERSTATISTICS']._serialized_end=1655
+  _globals['_ISENSORSERVICE']._serialized_start=1658
+  _globals['_ISENSORSERVICE']._serialized_end=2215
+  _globals['_ISENSOREVENTLISTENER']._serialized_start=2217
+  _globals['_ISENSOREVENTLISTENER']._serialized_end=2304
+  _globals['_IDYNAMICSENSORCALLBACK']._serialized_start=2306
+  _globals['_IDYNAMICSENSORCALLBACK']._serialized_end=2402
 # @@protoc_insertion_point(module_scope)

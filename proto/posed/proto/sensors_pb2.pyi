@@ -15,7 +15,7 @@ class SensorList(_message.Message):
     def __init__(self, sensors: _Optional[_Iterable[_Union[SensorInfo, _Mapping]]] = ...) -> None: ...
 
 class SensorInfo(_message.Message):
-    __slots__ = ("handle", "type", "string_type", "name", "vendor", "version", "max_range", "resolution", "power_ma", "min_delay_us", "max_delay_us", "fifo_reserved_event_count", "fifo_max_event_count", "reporting_mode", "wake_up")
+    __slots__ = ("handle", "type", "string_type", "name", "vendor", "version", "max_range", "resolution", "power_ma", "min_delay_us", "max_delay_us", "fifo_reserved_event_count", "fifo_max_event_count", "reporting_mode", "wake_up", "required_permission", "is_dynamic", "has_additional_info", "supports_data_injection", "id")
     HANDLE_FIELD_NUMBER: _ClassVar[int]
     TYPE_FIELD_NUMBER: _ClassVar[int]
     STRING_TYPE_FIELD_NUMBER: _ClassVar[int]
@@ -31,6 +31,11 @@ class SensorInfo(_message.Message):
     FIFO_MAX_EVENT_COUNT_FIELD_NUMBER: _ClassVar[int]
     REPORTING_MODE_FIELD_NUMBER: _ClassVar[int]
     WAKE_UP_FIELD_NUMBER: _ClassVar[int]
+    REQUIRED_PERMISSION_FIELD_NUMBER: _ClassVar[int]
+    IS_DYNAMIC_FIELD_NUMBER: _ClassVar[int]
+    HAS_ADDITIONAL_INFO_FIELD_NUMBER: _ClassVar[int]
+    SUPPORTS_DATA_INJECTION_FIELD_NUMBER: _ClassVar[int]
+    ID_FIELD_NUMBER: _ClassVar[int]
     handle: int
     type: int
     string_type: str
@@ -46,19 +51,26 @@ class SensorInfo(_message.Message):
     fifo_max_event_count: int
     reporting_mode: int
     wake_up: bool
-    def __init__(self, handle: _Optional[int] = ..., type: _Optional[int] = ..., string_type: _Optional[str] = ..., name: _Optional[str] = ..., vendor: _Optional[str] = ..., version: _Optional[int] = ..., max_range: _Optional[float] = ..., resolution: _Optional[float] = ..., power_ma: _Optional[float] = ..., min_delay_us: _Optional[int] = ..., max_delay_us: _Optional[int] = ..., fifo_reserved_event_count: _Optional[int] = ..., fifo_max_event_count: _Optional[int] = ..., reporting_mode: _Optional[int] = ..., wake_up: bool = ...) -> None: ...
+    required_permission: str
+    is_dynamic: bool
+    has_additional_info: bool
+    supports_data_injection: bool
+    id: int
+    def __init__(self, handle: _Optional[int] = ..., type: _Optional[int] = ..., string_type: _Optional[str] = ..., name: _Optional[str] = ..., vendor: _Optional[str] = ..., version: _Optional[int] = ..., max_range: _Optional[float] = ..., resolution: _Optional[float] = ..., power_ma: _Optional[float] = ..., min_delay_us: _Optional[int] = ..., max_delay_us: _Optional[int] = ..., fifo_reserved_event_count: _Optional[int] = ..., fifo_max_event_count: _Optional[int] = ..., reporting_mode: _Optional[int] = ..., wake_up: bool = ..., required_permission: _Optional[str] = ..., is_dynamic: bool = ..., has_additional_info: bool = ..., supports_data_injection: bool = ..., id: _Optional[int] = ...) -> None: ...
 
 class EnableSensorRequest(_message.Message):
-    __slots__ = ("listener", "handle", "sampling_period_us", "max_report_latency_us")
+    __slots__ = ("listener", "handle", "sampling_period_us", "max_report_latency_us", "decimate")
     LISTENER_FIELD_NUMBER: _ClassVar[int]
     HANDLE_FIELD_NUMBER: _ClassVar[int]
     SAMPLING_PERIOD_US_FIELD_NUMBER: _ClassVar[int]
     MAX_REPORT_LATENCY_US_FIELD_NUMBER: _ClassVar[int]
+    DECIMATE_FIELD_NUMBER: _ClassVar[int]
     listener: str
     handle: int
     sampling_period_us: int
     max_report_latency_us: int
-    def __init__(self, listener: _Optional[str] = ..., handle: _Optional[int] = ..., sampling_period_us: _Optional[int] = ..., max_report_latency_us: _Optional[int] = ...) -> None: ...
+    decimate: bool
+    def __init__(self, listener: _Optional[str] = ..., handle: _Optional[int] = ..., sampling_period_us: _Optional[int] = ..., max_report_latency_us: _Optional[int] = ..., decimate: bool = ...) -> None: ...
 
 class DisableSensorRequest(_message.Message):
     __slots__ = ("listener", "handle")
@@ -73,6 +85,26 @@ class FlushRequest(_message.Message):
     LISTENER_FIELD_NUMBER: _ClassVar[int]
     listener: str
     def __init__(self, listener: _Optional[str] = ...) -> None: ...
+
+class DynamicSensorCallbackRequest(_message.Message):
+    __slots__ = ("callback",)
+    CALLBACK_FIELD_NUMBER: _ClassVar[int]
+    callback: str
+    def __init__(self, callback: _Optional[str] = ...) -> None: ...
+
+class DumpRequest(_message.Message):
+    __slots__ = ("offset",)
+    OFFSET_FIELD_NUMBER: _ClassVar[int]
+    offset: int
+    def __init__(self, offset: _Optional[int] = ...) -> None: ...
+
+class DumpReply(_message.Message):
+    __slots__ = ("text", "more")
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    MORE_FIELD_NUMBER: _ClassVar[int]
+    text: str
+    more: bool
+    def __init__(self, text: _Optional[str] = ..., more: bool = ...) -> None: ...
 
 class Statistics(_message.Message):
     __slots__ = ("timestamp_ns", "process_cpu_ns", "source_cpu_ns", "filter_cpu_ns", "wakeups", "events_fused", "poses_published", "poses_skipped", "lateness_p50_ms", "lateness_p99_ms", "sensors", "listeners", "parcels_refused", "source_ended")
@@ -123,17 +155,21 @@ class SensorStatistics(_message.Message):
     def __init__(self, handle: _Optional[int] = ..., requested_period_us: _Optional[int] = ..., configured_period_ns: _Optional[int] = ..., max_report_latency_us: _Optional[int] = ..., registrations: _Optional[int] = ..., events: _Optional[int] = ...) -> None: ...
 
 class ListenerStatistics(_message.Message):
-    __slots__ = ("uid", "pid", "listener", "events_sent", "events_dropped", "events_cached")
+    __slots__ = ("uid", "pid", "listener", "events_sent", "events_dropped", "events_cached", "package_name", "events_received")
     UID_FIELD_NUMBER: _ClassVar[int]
     PID_FIELD_NUMBER: _ClassVar[int]
     LISTENER_FIELD_NUMBER: _ClassVar[int]
     EVENTS_SENT_FIELD_NUMBER: _ClassVar[int]
     EVENTS_DROPPED_FIELD_NUMBER: _ClassVar[int]
     EVENTS_CACHED_FIELD_NUMBER: _ClassVar[int]
+    PACKAGE_NAME_FIELD_NUMBER: _ClassVar[int]
+    EVENTS_RECEIVED_FIELD_NUMBER: _ClassVar[int]
     uid: int
     pid: int
     listener: str
     events_sent: int
     events_dropped: int
     events_cached: int
-    def __init__(self, uid: _Optional[int] = ..., pid: _Optional[int] = ..., listener: _Optional[str] = ..., events_sent: _Optional[int] = ..., events_dropped: _Optional[int] = ..., events_cached: _Optional[int] = ...) -> None: ...
+    package_name: str
+    events_received: int
+    def __init__(self, uid: _Optional[int] = ..., pid: _Optional[int] = ..., listener: _Optional[str] = ..., events_sent: _Optional[int] = ..., events_dropped: _Optional[int] = ..., events_cached: _Optional[int] = ..., package_name: _Optional[str] = ..., events_received: _Optional[int] = ...) -> None: ...

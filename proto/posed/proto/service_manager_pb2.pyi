@@ -1,7 +1,8 @@
 from posed.proto import binder_pb2 as _binder_pb2
+from google.protobuf.internal import containers as _containers
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
-from collections.abc import Mapping as _Mapping
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
 from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
@@ -23,12 +24,18 @@ class ServiceInfo(_message.Message):
     def __init__(self, interface: _Optional[_Union[_binder_pb2.InterfaceInfo, _Mapping]] = ..., boot_id: _Optional[bytes] = ...) -> None: ...
 
 class BindRequest(_message.Message):
-    __slots__ = ("auto_create", "connection")
+    __slots__ = ("auto_create", "connection", "package_name", "target_sdk", "permissions")
     AUTO_CREATE_FIELD_NUMBER: _ClassVar[int]
     CONNECTION_FIELD_NUMBER: _ClassVar[int]
+    PACKAGE_NAME_FIELD_NUMBER: _ClassVar[int]
+    TARGET_SDK_FIELD_NUMBER: _ClassVar[int]
+    PERMISSIONS_FIELD_NUMBER: _ClassVar[int]
     auto_create: bool
     connection: str
-    def __init__(self, auto_create: bool = ..., connection: _Optional[str] = ...) -> None: ...
+    package_name: str
+    target_sdk: int
+    permissions: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, auto_create: bool = ..., connection: _Optional[str] = ..., package_name: _Optional[str] = ..., target_sdk: _Optional[int] = ..., permissions: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class StopRequest(_message.Message):
     __slots__ = ("force",)

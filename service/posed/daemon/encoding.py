@@ -122,6 +122,11 @@ def sensor_list(sensors: Iterable[SensorInfo]) -> sensors_pb2.SensorList:
                 fifo_max_event_count=sensor.fifo_max_event_count,
                 reporting_mode=int(sensor.reporting_mode),
                 wake_up=sensor.wake_up,
+                required_permission=sensor.required_permission,
+                is_dynamic=sensor.is_dynamic,
+                has_additional_info=sensor.has_additional_info,
+                supports_data_injection=sensor.supports_data_injection,
+                id=-1 if sensor.is_dynamic else 0,
             )
             for sensor in sensors
         ]

@@ -14,6 +14,7 @@ from posed.binder.server import Server
 from posed.binder.sockets import Socket, context
 from posed.binder.stub import Stub
 from posed.clock import BootClock, Clock
+from posed.daemon.clients import ClientRegistry
 from posed.daemon.config import DaemonConfig
 from posed.daemon.encoding import delivery_header
 from posed.daemon.lifecycle import Lifecycle
@@ -72,12 +73,17 @@ class _Daemon:
         self._publisher = PosePublisher(
             pose_path(directory), self._context, self._boot_id, clock, self._source, statistics
         )
-        self._sensors = SensorServiceStub(self._service, clock, statistics, lambda: self._server.parcels_refused)
+        clients = ClientRegistry()
+        self._sensors = SensorServiceStub(
+            self._service, clients, clock, statistics, lambda: self._server.parcels_refused
+        )
         services: dict[str, Stub] = {
             "sensorservice": self._sensors,
             "poseservice": PoseServiceStub(self._service, config.filter, profile),
         }
-        self._manager = ServiceManagerStub(services, self._server.peers, self._lifecycle, clock, self._boot_id, config)
+        self._manager = ServiceManagerStub(
+            services, self._server.peers, self._lifecycle, clients, clock, self._boot_id, config
+        )
         for name, stub in {"servicemanager": self._manager, **services}.items():
             self._server.add_service(name, stub)
         self._waiter = Waiter((*self._server.sockets, self._publisher.socket))
@@ -102,8 +108,9 @@ class _Daemon:
                     if self._clock.now_ns() >= wait_for_bind_ns:
                         break
                     deadline_ns = min(deadline_ns or wait_for_bind_ns, wait_for_bind_ns)
-                if self._server.retry_s is not None:
-                    retry_ns = self._clock.now_ns() + int(self._server.retry_s * 1e9)
+                if self._server.retry_s is not None or self._sensors.retry_s is not None:
+                    retry_s = self._server.retry_s or self._sensors.retry_s or 0.0
+                    retry_ns = self._clock.now_ns() + int(retry_s * 1e9)
                     deadline_ns = min(deadline_ns or retry_ns, retry_ns)
                 readable = self._waiter.readable()
                 idle = not (calls_wait or readable or self._lifecycle.over)

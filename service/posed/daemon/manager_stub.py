@@ -8,6 +8,7 @@ from posed.binder.peer import Peer
 from posed.binder.proxy import Proxy
 from posed.binder.stub import Caller, Stub
 from posed.clock import Clock
+from posed.daemon.clients import ClientRegistry
 from posed.daemon.config import DaemonConfig
 from posed.daemon.lifecycle import Lifecycle
 from posed.errors import InvalidArgumentError
@@ -25,6 +26,7 @@ class ServiceManagerStub(Stub):
         services: Mapping[str, Stub],
         peers: Mapping[bytes, Peer],
         lifecycle: Lifecycle,
+        clients: ClientRegistry,
         clock: Clock,
         boot_id: bytes,
         config: DaemonConfig,
@@ -32,6 +34,7 @@ class ServiceManagerStub(Stub):
         self._services = services
         self._peers = peers
         self._lifecycle = lifecycle
+        self._clients = clients
         self._clock = clock
         self._boot_id = boot_id
         self._config = config
@@ -56,6 +59,7 @@ class ServiceManagerStub(Stub):
 
     def bindService(self, request: service_manager_pb2.BindRequest, caller: Caller) -> binder_pb2.Empty:
         peer = caller.peer
+        self._clients.register(peer, request)
         if peer not in self._watched:
             self._watched.add(peer)
             peer.link_to_death(lambda: self._peer_died(peer))
@@ -99,6 +103,7 @@ class ServiceManagerStub(Stub):
 
     def _peer_died(self, peer: Peer) -> None:
         self._watched.discard(peer)
+        self._clients.forget(peer)
         self._unbind(peer)
 
 

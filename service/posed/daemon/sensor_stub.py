@@ -1,34 +1,23 @@
-"""The object "sensorservice": listeners of sensor events, and the statistics."""
+"""The object "sensorservice": the sensor list, listeners of events, dynamic sensors, the state and the statistics."""
 
-import logging
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from posed.binder.peer import Peer
 from posed.binder.proxy import Proxy
 from posed.binder.stub import Caller, Stub
 from posed.clock import Clock
 from posed.daemon import encoding
+from posed.daemon.clients import ClientRegistry
+from posed.daemon.listeners import Listeners
 from posed.daemon.statistics import PublicationStatistics, process_cpu_ns, voluntary_switches
-from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
+from posed.errors import InvalidArgumentError, InvalidStateError
 from posed.proto import binder_pb2, events_pb2, sensors_pb2
-from posed.sensors import SensorEventConnection, SensorService
+from posed.sensors import SensorService
+from posed.sensors.dump import Traffic, dump
 
-_log = logging.getLogger(__name__)
-
-# Keeps a message of the widest events (6 values) below 64 KiB: 1000 * (8 + 6 * 4 + 1) bytes.
-_EVENTS_A_MESSAGE = 1000
-
-
-@dataclass(slots=True)
-class _Listener:
-    peer: Peer
-    name: str
-    proxy: Proxy
-    connection: SensorEventConnection
-    messages: int = 0
-    events_sent: int = 0
-    unsent: events_pb2.SensorEvents | None = None
+# Characters of a dump in one reply: of UTF-8's four bytes each, still below 64 KiB.
+_DUMP_PART = 16_000
 
 
 class SensorServiceStub(Stub):
@@ -39,68 +28,104 @@ class SensorServiceStub(Stub):
     def __init__(
         self,
         service: SensorService,
+        clients: ClientRegistry,
         clock: Clock,
         publication: PublicationStatistics,
         parcels_refused: Callable[[], int],
     ) -> None:
         self._service = service
-        self._parcels_refused = parcels_refused
+        self._clients = clients
         self._clock = clock
         self._publication = publication
-        self._listeners: dict[tuple[Peer, str], _Listener] = {}
+        self._parcels_refused = parcels_refused
+        self._listeners = Listeners(service, clock)
+        self._dynamic_callbacks: dict[tuple[Peer, str], Proxy] = {}
+        self._dynamic_changes_told = 0
+        self._dumps: dict[Peer, str] = {}
         self._watched: set[Peer] = set()
 
-    def deliver(self, header: Callable[[int], events_pb2.DeliveryHeader]) -> None:
-        """Send every listener what waits for it; what a full socket refuses stays for the next call.
+    @property
+    def retry_s(self) -> float | None:
+        """When to deliver again though nothing is due, seconds from now; None if nothing is held up."""
+        return self._listeners.retry_s
 
-        header makes the delivery header of a message from its sequence.
-        """
-        for listener in self._listeners.values():
-            while listener.unsent is not None or listener.connection:
-                if listener.unsent is None:
-                    chunk = listener.connection.take(_EVENTS_A_MESSAGE)
-                    listener.messages += 1
-                    listener.unsent = encoding.sensor_events(
-                        header(listener.messages), chunk, listener.connection.events_dropped
-                    )
-                try:
-                    sent = listener.proxy.onSensorEvents(listener.unsent)
-                except PosedError:
-                    # Whatever one listener's message fails of, the other listeners are not to suffer from it.
-                    _log.exception("a message to listener %r of process %d is lost", listener.name, listener.peer.pid)
-                    listener.unsent = None
-                    continue
-                if not sent:
-                    break
-                listener.events_sent += sum(len(column.timestamp_ns) for column in listener.unsent.columns)
-                listener.unsent = None
+    def deliver(self, header: Callable[[int], events_pb2.DeliveryHeader]) -> None:
+        """Send what waits for listeners and callbacks; header makes a message's from its sequence."""
+        self._listeners.deliver(header)
+        if self._service.dynamic_changes != self._dynamic_changes_told:
+            self._dynamic_changes_told = self._service.dynamic_changes
+            message = encoding.sensor_list(self._service.dynamic_sensors)
+            for callback in self._dynamic_callbacks.values():
+                callback.onDynamicSensorsChanged(message)
+
+    # ISensorService
 
     def getSensorList(self, request: binder_pb2.Empty, caller: Caller) -> sensors_pb2.SensorList:
-        return encoding.sensor_list(self._service.sensors)
+        client = self._clients.of(caller.peer)
+        return encoding.sensor_list(client.sees(info) for info in self._service.sensors)
+
+    def getDynamicSensorList(self, request: binder_pb2.Empty, caller: Caller) -> sensors_pb2.SensorList:
+        client = self._clients.of(caller.peer)
+        return encoding.sensor_list(client.sees(info) for info in self._service.dynamic_sensors)
 
     def enableSensor(self, request: sensors_pb2.EnableSensorRequest, caller: Caller) -> binder_pb2.Empty:
-        listener = self._listener(caller.peer, request.listener)
+        listener = self._listeners.find_or_add(caller.peer, request.listener, self._clients.of(caller.peer))
+        self._watch(caller.peer)
         try:
             self._service.enable(
-                listener.connection, request.handle, request.sampling_period_us, request.max_report_latency_us
+                listener.connection,
+                request.handle,
+                request.sampling_period_us,
+                request.max_report_latency_us,
+                request.decimate,
             )
         finally:
-            self._forget_if_idle(listener)
+            self._listeners.forget_if_idle(listener)
         return binder_pb2.Empty()
 
     def disableSensor(self, request: sensors_pb2.DisableSensorRequest, caller: Caller) -> binder_pb2.Empty:
-        listener = self._listeners.get((caller.peer, request.listener))
+        listener = self._listeners.find(caller.peer, request.listener)
         if listener is not None:
             self._service.disable(listener.connection, request.handle)
-            self._forget_if_idle(listener)
+            if not listener.connection.registrations:
+                # Nobody is there any more for what still waits.
+                self._listeners.forget(listener)
         return binder_pb2.Empty()
 
     def flush(self, request: sensors_pb2.FlushRequest, caller: Caller) -> binder_pb2.Empty:
-        listener = self._listeners.get((caller.peer, request.listener))
+        listener = self._listeners.find(caller.peer, request.listener)
         if listener is None:
             raise InvalidStateError(f"listener {request.listener!r} has no sensor registered: nothing to flush")
         self._service.flush(listener.connection)
         return binder_pb2.Empty()
+
+    def registerDynamicSensorCallback(
+        self, request: sensors_pb2.DynamicSensorCallbackRequest, caller: Caller
+    ) -> binder_pb2.Empty:
+        if not request.callback:
+            raise InvalidArgumentError("the request names no callback object; give its name")
+        self._watch(caller.peer)
+        self._dynamic_callbacks[caller.peer, request.callback] = caller.peer.proxy(_DYNAMIC_CALLBACK, request.callback)
+        return binder_pb2.Empty()
+
+    def unregisterDynamicSensorCallback(
+        self, request: sensors_pb2.DynamicSensorCallbackRequest, caller: Caller
+    ) -> binder_pb2.Empty:
+        self._dynamic_callbacks.pop((caller.peer, request.callback), None)
+        return binder_pb2.Empty()
+
+    def dump(self, request: sensors_pb2.DumpRequest, caller: Caller) -> sensors_pb2.DumpReply:
+        peer = caller.peer
+        if request.offset == 0:
+            self._watch(peer)
+            traffic = {each.connection: Traffic(each.events_sent, each.events_cached) for each in self._listeners}
+            self._dumps[peer] = dump(self._service, self._clock.now_ns(), time.time_ns(), traffic)
+        text = self._dumps.get(peer, "")
+        end = request.offset + _DUMP_PART
+        more = end < len(text)
+        if not more:
+            self._dumps.pop(peer, None)
+        return sensors_pb2.DumpReply(text=text[request.offset : end], more=more)
 
     def getStatistics(self, request: binder_pb2.Empty, caller: Caller) -> sensors_pb2.Statistics:
         p50_ms, p99_ms = self._publication.lateness_percentiles_ms()
@@ -133,32 +158,29 @@ class SensorServiceStub(Stub):
                     listener=listener.name,
                     events_sent=listener.events_sent,
                     events_dropped=listener.connection.events_dropped,
-                    events_cached=listener.connection.events_cached,
+                    events_cached=listener.events_cached,
+                    package_name=listener.connection.client.package_name,
+                    events_received=listener.connection.events_received,
                 )
-                for listener in self._listeners.values()
+                for listener in self._listeners
             ],
             parcels_refused=self._parcels_refused(),
             source_ended=self._service.ended,
         )
 
-    def _listener(self, peer: Peer, name: str) -> _Listener:
-        if not name:
-            raise InvalidArgumentError("the request names no listener; give the name of its callback object")
-        listener = self._listeners.get((peer, name))
-        if listener is None:
-            proxy = peer.proxy(sensors_pb2.DESCRIPTOR.services_by_name["ISensorEventListener"], name)
-            listener = _Listener(peer, name, proxy, self._service.connect())
-            if peer not in self._watched:
-                self._watched.add(peer)
-                peer.link_to_death(lambda: self._peer_died(peer))
-            self._listeners[peer, name] = listener
-        return listener
+    # Private
 
-    def _forget_if_idle(self, listener: _Listener) -> None:
-        if not self._service.is_registered(listener.connection):
-            del self._listeners[listener.peer, listener.name]
+    def _watch(self, peer: Peer) -> None:
+        if peer not in self._watched:
+            self._watched.add(peer)
+            peer.link_to_death(lambda: self._peer_died(peer))
 
     def _peer_died(self, peer: Peer) -> None:
         self._watched.discard(peer)
-        for key in [key for key in self._listeners if key[0] is peer]:
-            self._service.disconnect(self._listeners.pop(key).connection)
+        self._dumps.pop(peer, None)
+        self._listeners.forget_all_of(peer)
+        for key in [key for key in self._dynamic_callbacks if key[0] is peer]:
+            del self._dynamic_callbacks[key]
+
+
+_DYNAMIC_CALLBACK = sensors_pb2.DESCRIPTOR.services_by_name["IDynamicSensorCallback"]

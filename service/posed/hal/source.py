@@ -11,6 +11,10 @@ class SensorSource(Protocol):
 
     A source is given its Clock when it is made. What it yields depends on the calls made between two drains, never on
     how often it is drained.
+
+    A source that can lose its phone raises SourceLostError from activate, batch, flush, drain and next_sample_ns, at
+    least once and until it has one again. Then it has forgotten what was activated and batched, and the samples of the
+    time between; its sensors are the same. The caller tries again, beginning with batch and activate.
     """
 
     @property
@@ -26,7 +30,11 @@ class SensorSource(Protocol):
         """Sample time of the last sample there will ever be, None for a source without end."""
 
     def activate(self, handle: int, enabled: bool) -> None:
-        """Switch a sensor on or off; idempotent. Samples not drained when it goes off are abandoned."""
+        """Switch a sensor on or off; idempotent. Samples not drained when it goes off are abandoned.
+
+        An on-change sensor yields its present value when it goes on, and then its changes, none sooner than its period
+        after the one before. A one-shot sensor is off once it has fired.
+        """
 
     def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:
         """Set a sensor's period, active or not, and return the period configured (ns), which the profile decides."""

@@ -1,7 +1,8 @@
 """Android's sensor service without sockets: catalogue, arbitration, FIFOs, fused sensors and the pose grid."""
 
+from posed.sensors.client import Client
 from posed.sensors.connection import EventChunk, SensorEventConnection
 from posed.sensors.pose_fusion import device_noise, make_device_filter
 from posed.sensors.service import SensorService
 
-__all__ = ["EventChunk", "SensorEventConnection", "SensorService", "device_noise", "make_device_filter"]
+__all__ = ["Client", "EventChunk", "SensorEventConnection", "SensorService", "device_noise", "make_device_filter"]

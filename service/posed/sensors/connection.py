@@ -7,11 +7,15 @@ from itertools import takewhile
 
 import numpy as np
 
-from posed.events import EventColumn
+from posed.events import EventColumn, SensorInfo
+from posed.sensors.client import Client
+from posed.sensors.decimation import Decimator
 
 MAX_FLUSH_COMPLETES = 1000
 """Flush-completes that may wait for one listener; so many fit one message."""
 
+_CACHE_WITHOUT_FIFO = 984
+"""Events kept where none of the listener's sensors has a hardware FIFO (100 KB of sensors_event_t)."""
 
 _Entry = tuple[int, EventColumn | None]
 """A sensor's handle with events of its, or with None: a flush-complete."""
@@ -24,13 +28,33 @@ class EventChunk:
     columns: dict[int, EventColumn]
     flush_completes: tuple[int, ...]
 
+    def __len__(self) -> int:
+        return sum(len(column) for column in self.columns.values())
+
+
+@dataclass(slots=True)
+class SensorRegistration:
+    """One sensor of a connection."""
+
+    info: SensorInfo
+    decimator: Decimator | None = None
+    first_flush_pending: bool = False
+    """True for one who joined a running sensor, until what was sampled for the others is out of the way."""
+    pending_flushes: int = 0
+    """Flushes asked for and not complete yet."""
+
 
 class SensorEventConnection:
     """The FIFO between the service and one listener. A flush-complete is never dropped."""
 
-    def __init__(self, capacity: int) -> None:
-        self.capacity = capacity
-        """Events kept while the listener does not read."""
+    def __init__(self, client: Client | None = None) -> None:
+        self.client = client or Client()
+        self.registrations: dict[int, SensorRegistration] = {}
+        """Its sensors by handle; `add` and `remove` change them."""
+        self.capacity = _CACHE_WITHOUT_FIFO
+        """Events kept for a listener that does not read."""
+        self.events_received = 0
+        """Events of its sensors, dropped ones counted."""
         self.events_dropped = 0
         self.events_cached = 0
         """Events waiting to be taken."""
@@ -41,17 +65,54 @@ class SensorEventConnection:
     def __bool__(self) -> bool:
         return bool(self._queue)
 
+    def add(self, registration: SensorRegistration) -> None:
+        """Give it a sensor."""
+        self.registrations[registration.info.handle] = registration
+        self.capacity = cache_limit([each.info for each in self.registrations.values()])
+
+    def remove(self, handle: int) -> None:
+        """Undo `add`; what is queued stays."""
+        del self.registrations[handle]
+        self.capacity = cache_limit([each.info for each in self.registrations.values()])
+
+    def offer(self, handle: int, column: EventColumn, sample_period_ns: int) -> None:
+        """Queue events of one of its sensors, which come every `sample_period_ns`, unless they are not for it."""
+        registration = self.registrations[handle]
+        if registration.first_flush_pending:
+            return
+        if registration.decimator is not None:
+            column = registration.decimator(column, sample_period_ns)
+        if len(column):
+            self.append(handle, column)
+
+    def complete_flush(self, handle: int) -> None:
+        """Take in a flush-complete addressed to it; the one of its joining is not for the listener to see."""
+        registration = self.registrations.get(handle)
+        if registration is None:
+            return
+        if registration.first_flush_pending:
+            registration.first_flush_pending = False
+            return
+        registration.pending_flushes -= 1
+        self.append_flush_complete(handle)
+
     def append(self, handle: int, column: EventColumn) -> None:
-        """Queue events of one sensor; beyond the capacity the oldest queued of all sensors go."""
+        """Queue events of one sensor."""
         self._queue.append((handle, column))
+        self.events_received += len(column)
         self.events_cached += len(column)
-        if self.events_cached > self.capacity:
-            self._drop_oldest(self.events_cached - self.capacity)
 
     def append_flush_complete(self, handle: int) -> None:
         """Queue a flush-complete behind what is queued."""
         self._queue.append((handle, None))
         self.flush_completes += 1
+
+    def drop_overflow(self) -> int:
+        """Drop the oldest queued of all sensors beyond the capacity and return how many; called when none can leave."""
+        count = max(0, self.events_cached - self.capacity)
+        if count:
+            self._drop_oldest(count)
+        return count
 
     def take(self, max_events: int) -> EventChunk:
         """Remove and return the oldest events, at most `max_events`, ending behind the first run of flush-completes."""
@@ -87,6 +148,21 @@ class SensorEventConnection:
             elif (gone := next(dropped)) < len(column):
                 kept.append((handle, column[gone:]))
         self._queue = deque(kept)
+
+
+def cache_limit(sensors: Sequence[SensorInfo]) -> int:
+    """Return how many events are kept for one who has these sensors (SensorEventConnection::computeMaxCacheSizeLocked).
+
+    The hardware FIFOs that would fill meanwhile: those reserved for one sensor add up, of shared ones the largest
+    counts, for wake-up sensors and the others apart.
+    """
+    limit = 0
+    for wake_up in (False, True):
+        fifos = [each for each in sensors if each.wake_up is wake_up]
+        dedicated = [each for each in fifos if each.fifo_reserved_event_count == each.fifo_max_event_count]
+        shared = [each.fifo_max_event_count for each in fifos if each not in dedicated]
+        limit += sum(each.fifo_max_event_count for each in dedicated) + max(shared, default=0)
+    return limit or _CACHE_WITHOUT_FIFO
 
 
 def _is_column(entry: _Entry) -> bool:

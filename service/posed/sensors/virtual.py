@@ -51,6 +51,10 @@ def virtual_sensors(physical: Sequence[SensorInfo]) -> tuple[SensorInfo, ...]:
 FUSION_INPUTS = (SensorType.ACCELEROMETER, SensorType.GYROSCOPE, SensorType.MAGNETIC_FIELD)
 
 
+LEAD = SensorType.ACCELEROMETER
+"""The input whose events the fused sensors follow."""
+
+
 def input_periods_ns(sampling_period_ns: int) -> Mapping[SensorType, int]:
     """Return the period each input needs for a fused sensor at this period (AOSP SensorFusion::setDelay)."""
     return {

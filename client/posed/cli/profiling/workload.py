@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from posed.cli.connection import PACKAGE
 from posed.client import PoseClient, Sensor, SensorEvent, SensorManager
 from posed.errors import ServiceUnavailableError
 
@@ -46,7 +47,7 @@ def raw(rate_mode: int, max_report_latency_us: int) -> dict[str, Any]:
     """Listen to the pose's input sensors; return count, first and last timestamp (ns) of each one's events."""
     counter = _Counter()
     ended = threading.Event()
-    with SensorManager() as manager:
+    with SensorManager(package=PACKAGE) as manager:
         manager.wait_connected()
         for sensor_type in _INPUTS:
             sensor = manager.get_default_sensor(sensor_type)

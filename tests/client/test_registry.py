@@ -1,0 +1,103 @@
+"""Registrations between listeners and a daemon that refuses some of them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from posed.binder.status import ExceptionCode, RemoteError
+from posed.client import Package, Sensor, SensorEvent, ServiceState
+from posed.client.event_queue import Registration
+from posed.client.registry import ListenerRegistry
+from posed.proto import sensors_pb2
+
+GYRO, ACC = (Sensor.of_message(sensors_pb2.SensorInfo(handle=handle, type=handle)) for handle in (4, 1))
+
+
+class Daemon:
+    """The daemon's end: notes what is enabled, refuses what `refuses` says."""
+
+    def __init__(self) -> None:
+        self.enabled: list[tuple[int, int]] = []
+        self.refuses: Callable[[Any], bool] = lambda request: False
+
+    def enableSensor(self, request: Any) -> None:
+        if self.refuses(request):
+            raise RemoteError(ExceptionCode.ILLEGAL_ARGUMENT, "refused")
+        self.enabled.append((request.handle, request.max_report_latency_us))
+
+    def disableSensor(self, request: Any) -> None:
+        pass
+
+
+class Service:
+    """Stands for the binding: runs actions at once."""
+
+    state = ServiceState.CONNECTED
+
+    def __init__(self) -> None:
+        self.connection = self
+        self.callbacks: set[str] = set()
+
+    def run(self, action: Callable[[], Any]) -> Any:
+        return action()
+
+    def add_callback(self, name: str, stub: Any) -> None:
+        self.callbacks.add(name)
+
+    def remove_callback(self, name: str) -> None:
+        self.callbacks.remove(name)
+
+
+class Listener:
+    def on_sensor_changed(self, event: SensorEvent) -> None:
+        pass
+
+
+@pytest.fixture
+def daemon() -> Daemon:
+    return Daemon()
+
+
+@pytest.fixture
+def service() -> Service:
+    return Service()
+
+
+@pytest.fixture
+def registry(daemon: Daemon, service: Service) -> ListenerRegistry:
+    made = ListenerRegistry(service)  # type: ignore[arg-type]
+    made.restore(daemon, {})  # type: ignore[arg-type]
+    return made
+
+
+def test_a_latency_that_is_refused_is_tried_once_more_as_streaming(registry: ListenerRegistry, daemon: Daemon) -> None:
+    daemon.refuses = lambda request: request.max_report_latency_us > 0
+    assert registry.register(Listener(), Registration(GYRO, 0, 1_000_000), None)
+    assert daemon.enabled == [(4, 0)]
+
+
+def test_a_refused_listener_leaves_nothing_behind(registry: ListenerRegistry, daemon: Daemon, service: Service) -> None:
+    daemon.refuses = lambda request: True
+    listener = Listener()
+    assert not registry.register(listener, Registration(GYRO, 0, 1_000_000), None)
+    assert service.callbacks == set()
+    daemon.refuses = lambda request: False
+    assert registry.register(listener, Registration(GYRO, 0, 0), None)
+
+
+def test_a_daemon_that_returns_is_asked_for_all_of_it_again(registry: ListenerRegistry) -> None:
+    listener = Listener()
+    registry.register(listener, Registration(GYRO, 0, 500), None)
+    registry.register(listener, Registration(ACC, 0, 0), None)
+    returned = Daemon()
+    returned.refuses = lambda request: request.handle == 4
+    registry.restore(returned, {})  # type: ignore[arg-type]
+    assert returned.enabled == [(1, 0)]
+    assert registry.register(listener, Registration(ACC, 0, 0), None) is False
+
+
+def test_a_program_is_called_after_its_script(monkeypatch: pytest.MonkeyPatch) -> None:
+    for argv, name in ((["/home/me/walk.py"], "walk"), (["-c"], "python"), ([""], "python"), ([], "python")):
+        monkeypatch.setattr("sys.argv", argv)
+        assert Package().name == name
