@@ -10,12 +10,15 @@ import pytest
 from made_trials import quaternion, write_attitude_set, write_broad_trial, write_csv_trial
 
 from posed.errors import InvalidArgumentError
-from posed.evaluation.rates import MODES, mode_events
+from posed.evaluation.fuse import fuse_recording
+from posed.evaluation.rates import MODES, PROFILE, mode_events
 from posed.evaluation.scoring import Answers, Track, error_track, phone_answers, run_filter, score
 from posed.evaluation.trial import Trial
 from posed.evaluation.trials import load_trial
-from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
+from posed.events import FilterStatus, FlatEvent, Orientation, RateMode, SensorType
 from posed.fusion import make_filter
+from posed.hal.profile import load_profile
+from posed.sensors import make_device_filter
 
 _GYROSCOPE = int(SensorType.GYROSCOPE)
 
@@ -135,6 +138,26 @@ def test_a_real_filter_finds_a_clean_phone(tmp_path: Path) -> None:
             continue
         answers = run_filter(made, mode_events(csv, "GAME"))
         assert score(csv, answers.filtered).total < 2.0, name
+
+
+@pytest.mark.parametrize("mode", ["FASTEST", "NORMAL"])
+@pytest.mark.parametrize("aligned", [False, True])
+def test_the_poses_scored_are_those_that_a_daemon_publishes(trial: Trial, mode: Any, aligned: bool) -> None:
+    profile = load_profile(PROFILE)
+    answers = run_filter(make_device_filter("dcm", profile), mode_events(trial, mode))
+    track = answers.aligned if aligned else answers.poses
+    period_us = RateMode[mode].sampling_period_us
+    published = {
+        pose.instant_ns: pose.orientation.quaternion
+        for pose in fuse_recording(trial.recording, profile, sampling_period_us=period_us, aligned=aligned)
+    }
+    scored = {
+        instant_ns: tuple(quaternion)
+        for instant_ns, quaternion in zip(track.timestamp_ns.tolist(), track.quaternion.tolist(), strict=True)
+        if not math.isnan(quaternion[0])
+    }
+    assert len(scored) > 100
+    assert scored == published
 
 
 def test_the_phones_own_fusion(tmp_path: Path, trial: Trial) -> None:

@@ -79,13 +79,17 @@ def run(arguments: argparse.Namespace) -> int:
     plan = Plan(arguments.filters, arguments.modes, CalibrationChoice(arguments.calibration))
     plan.check()
     trials = find_trials(arguments.paths)
+    for path in (arguments.json, arguments.markdown, arguments.html):
+        if path:
+            _require_writable(path)
     with _progress(len(trials)) as on_trial:
         evaluation = evaluate(trials, plan, jobs=arguments.jobs, on_trial=on_trial)
     for skipped in evaluation.skipped:
         print(f"posed: skipped: {skipped.reason}", file=sys.stderr)
     if evaluation.results:
-        _show(evaluation)
+        # First what is kept: the reader of what is shown may leave, as `head` does.
         _write(evaluation, arguments)
+        _show(evaluation)
     if evaluation.skipped:
         count = len(evaluation.skipped)
         print(f"posed: {count} of {len(trials)} trials skipped, {len(trials) - count} evaluated", file=sys.stderr)
@@ -123,11 +127,17 @@ def _write(evaluation: Evaluation, arguments: argparse.Namespace) -> None:
         _save(arguments.html, as_html(evaluation))
 
 
-def _save(path: Path, content: str) -> None:
+def _require_writable(path: Path) -> None:
+    """Raise InvalidArgumentError now, not after minutes of work."""
     try:
-        path.write_text(content, encoding="utf-8")
+        with path.open("a"):
+            pass
     except OSError as error:
         raise InvalidArgumentError(f"cannot write {path}: {error.strerror}; name a file that can be written") from error
+
+
+def _save(path: Path, content: str) -> None:
+    path.write_text(content, encoding="utf-8")
     print(f"posed: wrote {path}", file=sys.stderr)
 
 

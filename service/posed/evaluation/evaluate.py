@@ -1,6 +1,7 @@
 """Filters over trials at rate modes: each trial by a process of its own, the results in the order of the trials."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -128,8 +129,11 @@ def _outcomes(trials: Sequence[Path], plan: Plan, jobs: int) -> Iterator[tuple[P
         for path in trials:
             yield path, _outcome(path, plan)
         return
-    # Spawned, not forked: a fork would take over whatever threads and locks the caller has.
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+    # Spawned, not forked: a fork would take over whatever threads and locks the caller has. Ctrl-C ends the
+    # processes at once and without a word.
+    with ProcessPoolExecutor(
+        jobs, get_context("spawn"), initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_DFL)
+    ) as pool:
         futures: dict[Future[tuple[Result, ...] | Skipped], Path] = {
             pool.submit(_outcome, path, plan): path for path in trials
         }

@@ -89,9 +89,11 @@ def _grouped_bars(
     if lying:
         axes.set_yticks(range(len(names)), names, fontsize=7)
         axes.invert_yaxis()
+        axes.margins(y=0.01)
         axes.set_xlabel("total RMSE, °")
     else:
-        axes.set_xticks(range(len(names)), names, fontsize=8, rotation=30 if len(names) > 6 else 0)
+        slanted = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if len(names) > 6 else {}
+        axes.set_xticks(range(len(names)), names, fontsize=8, **slanted)
         axes.set_ylabel("mean total RMSE, °")
     # An aliased mode is ten times worse than the rest: on a linear scale it would leave the rest invisible.
     if drawn and max(drawn) > 12.0 * min(drawn) > 0.0:
