@@ -1,6 +1,6 @@
 """Clients that count what they receive: python counting_clients.py NUMBER...
 
-Each listens to two sensors at a rate, a latency and with or without decimation by its number; numbers 1 and 25 to all
+Each listens to one sensor at a rate, a latency and with or without decimation by its number; numbers 1 and 25 to all
 there are, each event as it happens. The process says "ready", and for each line on stdin what its clients have got, as
 one line of JSON.
 """
@@ -32,7 +32,7 @@ class CountingClient:
         self.manager = SensorManager(package=Package(self.name))
         sensors = self.manager.get_sensor_list()
         if number not in _EVERYTHING:
-            sensors = [sensors[(number + k) % len(sensors)] for k in range(2)]
+            sensors = [sensors[number % len(sensors)]]
         for sensor in sensors:
             if not self.manager.register_listener(
                 self,

@@ -1,6 +1,7 @@
 """Android's SensorManager against a real daemon whose phone has sensors of every reporting mode."""
 
 import asyncio
+import json
 import subprocess
 import sys
 import threading
@@ -363,3 +364,16 @@ def test_dumpsys_tells_the_package_the_kernels_user_and_what_it_asked(desk: Any)
     assert "\t com.example.walk | WakeLockRefCount 0 | uid " in run.stdout
     assert "package=com.example.walk samplingPeriod=20000us batchingPeriod=100000us\n" in run.stdout
     assert run.stdout.index("Captured at: ") == 0
+
+
+def test_the_command_shows_sensors_of_every_reporting_mode(desk: Any) -> None:
+    desk.serve_bench_phone()
+    table = desk.posed("sensors")
+    assert table.returncode == 0
+    assert "motion_detect" in table.stdout
+    once = desk.posed("events", "motion_detect", "--json")
+    assert (once.returncode, once.stderr) == (0, "")
+    assert json.loads(once.stdout)["sensor"] == "motion_detect"
+    changes = desk.posed("events", "light", "--json", "--count", "3")
+    assert changes.returncode == 0
+    assert len(changes.stdout.splitlines()) == 3

@@ -193,6 +193,22 @@ def test_a_fifo_that_is_full_is_delivered_early_without_loss(make_bench: MakeBen
     assert len(_taken_ms(listener, GYRO)) == 10
 
 
+def test_a_fifo_filled_faster_than_asked_is_delivered_so_much_earlier() -> None:
+    profile = load_profile("patonis2018")
+    clock = VirtualClock(1_000_000_000)
+    service = SensorService(open_source("sim:still", profile, clock), make_device_filter("dcm", profile), clock)
+    listener = service.connect()
+    service.enable(listener, ACC, 30_000, 10_000_000)  # the part has 15, 50 and 100 Hz: it runs at 50
+    batches = []
+    while len(batches) < 5:
+        deadline_ns = service.next_deadline_ns()
+        assert deadline_ns is not None
+        clock.advance_to(deadline_ns)
+        service.advance()
+        batches.append(len(listener.take(1000)))
+    assert all(31 <= events <= 33 for events in batches)
+
+
 def test_a_slow_consumer_loses_its_oldest_events_and_keeps_their_order() -> None:
     connection = SensorEventConnection()
     connection.capacity = 10

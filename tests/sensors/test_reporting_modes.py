@@ -76,6 +76,20 @@ def test_a_joiner_of_a_batched_on_change_sensor_gets_the_last_value_once(make_be
     assert _taken(first, LIGHT) == [0, 300]
 
 
+def test_a_batched_on_change_sensor_waits_for_its_latency_or_a_full_fifo(make_bench: MakeBench) -> None:
+    bench = make_bench((LIGHT,), fifo=10)
+    listener = bench.service.connect()
+    bench.service.enable(listener, LIGHT, 0, 60_000_000)
+    for number in range(8):
+        bench.source.happen(LIGHT, 100 * number + 50, number)
+    bench.advance_ms(1000)
+    assert _taken(listener, LIGHT) == []
+    assert bench.deadline_ms == 60_000
+    bench.source.happen(LIGHT, 1050, 8)
+    bench.advance_ms(1100)
+    assert _taken(listener, LIGHT) == [0, *range(9)]
+
+
 def test_a_one_shot_sensor_is_off_before_its_listener_hears_of_it(make_bench: MakeBench) -> None:
     bench = make_bench((MOTION, GYRO))
     listener, other = bench.service.connect(), bench.service.connect()

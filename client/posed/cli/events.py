@@ -10,7 +10,7 @@ import sys
 from posed.cli.connection import PACKAGE, require_daemon
 from posed.cli.options import RATE_MODES, positive_count
 from posed.cli.sensors import short_name, unit
-from posed.client import Sensor, SensorEvent, SensorManager
+from posed.client import SENSOR_STATUS_ACCURACY_HIGH, Sensor, SensorEvent, SensorManager, TriggerEvent
 from posed.client.sensor import period_of_delay_us
 from posed.errors import InvalidArgumentError, PosedError
 
@@ -44,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--count", type=positive_count, metavar="N", help="end after N events")
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     parser.epilog = """\
-Another client's faster registration of the same sensor sets the rate for all, as in Android.
+Another client's faster registration of the same sensor sets the rate for all, as in Android. A one-shot sensor is
+waited for, and its event ends the command.
 
 Keys of --json: sensor (its type), handle, timestamp_ns (sample time), values (in the sensor's unit), accuracy
 (Android's SENSOR_STATUS, -1 to 3)."""
@@ -57,7 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
         with SensorManager(package=PACKAGE, on_service_disconnected=_tell_lost, on_binding_died=_tell_ended) as manager:
             sensor = find_sensor(arguments.sensor, manager.get_sensor_list())
             listener = _Listener()
-            if not manager.register_listener(listener, sensor, arguments.rate, arguments.latency):
+            if sensor.reporting_mode == Sensor.REPORTING_MODE_ONE_SHOT:
+                manager.request_trigger_sensor(listener, sensor)
+                arguments.count = 1
+            elif not manager.register_listener(listener, sensor, arguments.rate, arguments.latency):
                 raise PosedError(f"the daemon refused a listener for {short_name(sensor)}; see 'posed status'")
             _print_events(listener, arguments.count, arguments.json)
         if listener.dropped:
@@ -109,6 +113,9 @@ class _Listener:
                 self.events.get_nowait()
                 self.dropped += 1
         self.events.put_nowait(event)
+
+    def on_trigger(self, event: TriggerEvent) -> None:
+        self.on_sensor_changed(SensorEvent(event.sensor, event.timestamp, event.values, SENSOR_STATUS_ACCURACY_HIGH))
 
 
 def _print_events(listener: _Listener, count: int | None, as_json: bool) -> None:

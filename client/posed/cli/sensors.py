@@ -77,5 +77,6 @@ def _table(sensors: list[Sensor]) -> Table:
 
 
 def _rates(sensor: Sensor) -> str:
-    fastest = f"{1e6 / sensor.min_delay:.4g}" if sensor.min_delay else "?"
-    return f"{1e6 / sensor.max_delay:.3g}-{fastest}" if sensor.max_delay else fastest
+    """Return the slowest and fastest rate, or a dash for a sensor that tells of changes and has none."""
+    fastest = f"{1e6 / sensor.min_delay:.4g}" if sensor.min_delay > 0 else "-"
+    return f"{1e6 / sensor.max_delay:.3g}-{fastest}" if sensor.max_delay > 0 else fastest

@@ -98,6 +98,8 @@ class Listeners:
         header makes the delivery header of a message from its sequence.
         """
         self.retry_s = None
+        if not self._listeners:
+            return
         for listener in list(self._listeners.values()):
             while listener.waits:
                 if not self._send(listener, header):

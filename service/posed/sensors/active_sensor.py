@@ -41,13 +41,19 @@ class ActiveSensor:
         self.is_virtual = self.lead is not None
         self.is_one_shot = self.info.reporting_mode is ReportingMode.ONE_SHOT
 
-    def follow(self, params: BatchParams | None) -> None:
-        """Take over what the requests come to."""
+    def follow(self, params: BatchParams | None, configured_period_ns: int) -> None:
+        """Take over what the requests come to, and the period that the source made of it (0 of a virtual sensor)."""
         self.params = params
+        self.configured_period_ns = configured_period_ns
         self.latency_ns = None
         if params is not None and params.max_report_latency_ns is not None:
-            fifo_ns = self.info.fifo_max_event_count * params.sampling_period_ns
-            latency_ns = min(params.max_report_latency_ns, fifo_ns)
+            latency_ns = params.max_report_latency_ns
+            fifo = self.info.fifo_max_event_count
+            if not fifo:
+                latency_ns = 0
+            elif self.info.reporting_mode is ReportingMode.CONTINUOUS:
+                # The source may be faster than asked: then its FIFO is full so much earlier.
+                latency_ns = min(latency_ns, fifo * (configured_period_ns or params.sampling_period_ns))
             self.latency_ns = latency_ns if latency_ns > params.sampling_period_ns else 0
 
     def take_in(self, column: EventColumn, boot_ns: int) -> None:

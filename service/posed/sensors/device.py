@@ -61,8 +61,8 @@ class SensorDevice:
                 self._call(lambda: self._source.activate(handle, False))
             return 0
         was_active = handle in self._active
-        self._active[handle] = params
         period_ns = self._call(lambda: self._start(handle, params, was_active))
+        self._active[handle] = params
         return params.sampling_period_ns if period_ns is None else period_ns
 
     def flush(self, handle: int) -> None:

@@ -82,6 +82,7 @@ class Quantiser:
     def _rounded(
         self, values: "np.ndarray[tuple[int, int], np.dtype[np.float64]]"
     ) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-        rounded = np.rint(values / self._step)
+        rounded = values / self._step
+        np.rint(rounded, rounded)
         rounded *= self._step
         return rounded

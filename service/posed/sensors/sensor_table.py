@@ -108,11 +108,10 @@ class SensorTable:
         params = arbitrate(sensor.requests.values())
         if params == sensor.params:
             return
-        sensor.follow(params)
+        configured_ns = 0 if sensor.is_virtual else self._device.configure(sensor.info.handle, params)
+        sensor.follow(params, configured_ns)
         self._follow_requests()
-        if not sensor.is_virtual:
-            sensor.configured_period_ns = self._device.configure(sensor.info.handle, sensor.params)
-        if sensor.params is None:
+        if params is None:
             sensor.discard()
             sensor.flushing.clear()
         else:

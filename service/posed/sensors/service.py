@@ -333,6 +333,8 @@ class SensorService:
                 self._release(sensor)
             elif sensor.latency_ns:
                 batched.append(sensor)
+        if not batched:
+            return
         if self.ended or any(
             s.release_ns <= self._now_ns or s.pending_events >= s.info.fifo_max_event_count for s in batched
         ):
