@@ -2,6 +2,7 @@
 
 import { format } from "./angles.js";
 import { Camera } from "./camera.js";
+import { fromEnu } from "./geodesy.js";
 import { aboutUp, conjugate, extrapolate, multiply } from "./quaternion.js";
 import { Places } from "./places.js";
 
@@ -72,7 +73,10 @@ export class Scene {
 
   takeObserver(place) {
     this.observer = place;
-    this._start ??= place;
+    // The truth's path begins at a position that was stated; a measured one is where it has come to.
+    const gone = this.truth?.e ?? [0, 0, 0];
+    if (place.source === "fixed") this._start = place;
+    else this._start ??= fromEnu(place, gone.map((metres) => -metres));
   }
 
   /** Poses a second, from the arrivals of the last 16; NaN before the second, 0 when they have stopped. */
