@@ -31,7 +31,7 @@ import { Readout, notify } from "./readout.js";
 import { Scene } from "./scene.js";
 import { SettingsPanel } from "./settings-panel.js";
 import { listenTo } from "./stage.js";
-import { Target } from "./target.js";
+import { Target, sightOf } from "./target.js";
 
 const DEGREE = Math.PI / 180;
 const READ_EVERY_MS = 200;
@@ -202,7 +202,7 @@ function record() {
   }
   const { place } = target;
   const { heading, pitch } = frame.attitude;
-  const sight = place === null ? { bearing: heading, elevation: pitch, distance: null } : frame.sight;
+  const sight = place === null ? { bearing: heading, elevation: pitch, distance: null } : sightOf(place, frame.eye);
   const words = book.record({
     time: new Date().toISOString(),
     name: place?.name ?? "",
