@@ -1,10 +1,9 @@
-"""The AR page as somebody uses it: with keys and mouse, by its figures, in every orientation."""
+"""What the AR page tells and draws, against the geodesist, the truth, and full turns about every axis."""
 
 import csv
 import io
 import json
 import math
-import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -96,42 +95,6 @@ def test_nothing_goes_wrong_behind_the_scenes(open_page: Open) -> None:
     assert said == []
 
 
-def test_keys_alone_target_record_and_let_go(open_page: Open) -> None:
-    page, _ = open_page()
-    page.keyboard.press("ArrowRight")
-    first = _told(page, "target")
-    assert first["held"]
-    page.keyboard.press("ArrowRight")
-    second = _told(page, "target")
-    assert second["name"] != first["name"]
-    page.keyboard.press("ArrowLeft")
-    assert _told(page, "target")["name"] == first["name"]
-    page.locator("#said", has_text=first["name"]).wait_for(state="attached")
-    assert re.search(r"bearing .*, elevation .*, \d+ m", page.locator("#said").inner_text())
-    page.keyboard.press("Enter")
-    page.keyboard.press("b")
-    assert page.locator("#book-records li").count() == 1
-    assert page.evaluate("() => document.activeElement.id") == "book-title"
-    page.keyboard.press("Escape")
-    assert page.locator("#book").is_hidden()
-    page.keyboard.press("Escape")
-    _await_drawn(page)
-    target = _told(page, "target")
-    assert target is None or not target["held"]
-
-
-def test_a_tap_on_a_dot_holds_its_place(open_page: Open) -> None:
-    page, feed = open_page()
-    dot = _labels(page)["Gate"]
-    page.mouse.click(dot["x"], dot["y"])
-    assert _told(page, "target")["name"] == "Gate"
-    _look(page, feed, 180.0)
-    assert _told(page, "target")["name"] == "Gate"
-    page.locator("#target-clear").click()
-    _await_drawn(page)
-    assert _told(page, "target") is None or not _told(page, "target")["held"]
-
-
 def test_bearing_elevation_and_distance_are_those_of_the_geodesist(open_page: Open) -> None:
     page, _ = open_page()
     truth = json.loads(json.dumps(_labels(page)))
@@ -149,8 +112,14 @@ def test_bearing_elevation_and_distance_are_those_of_the_geodesist(open_page: Op
 def test_the_field_book_is_kept_and_given_out_as_csv_and_geojson(open_page: Open, tmp_path: Path) -> None:
     page, _ = open_page()
     for _ in range(3):
-        page.keyboard.press("ArrowRight")
-        page.keyboard.press("r")
+        # Both before the next frame is drawn, as somebody who is quick has it on a slow machine.
+        page.evaluate(
+            """() => {
+              for (const key of ["ArrowRight", "r"]) {
+                document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
+              }
+            }"""
+        )
     page.reload()
     page.keyboard.press("b")
     files = {}
@@ -172,28 +141,6 @@ def test_the_field_book_is_kept_and_given_out_as_csv_and_geojson(open_page: Open
         assert float(row["distance_m"]) == pytest.approx(math.hypot(distance, 60), abs=0.5)
         assert row["rate_mode"] == "GAME"
         assert abs(float(row["declination_deg"]) - 5.5) < 0.01
-
-
-def test_angles_are_told_in_the_unit_that_is_chosen(open_page: Open) -> None:
-    page, _ = open_page()
-    page.keyboard.press("ArrowRight")
-    _await_drawn(page)
-    bearing = _told(page, "target")["bearing"]
-    shown = page.locator("#target-bearing")
-    page.keyboard.press("s")
-    for unit, pattern, full in (
-        ("deg", r"([\d.]+)°", 360),
-        ("gon", r"([\d.]+) gon", 400),
-        ("dms", r"(\d+)° (\d\d)′", 360),
-    ):
-        page.locator("[name=unit]").select_option(unit)
-        page.wait_for_function(
-            "(pattern) => new RegExp(pattern).test(document.querySelector('#target-bearing').textContent)", arg=pattern
-        )
-        parts = re.search(pattern, shown.inner_text())
-        assert parts is not None
-        value = float(parts[1]) + (float(parts[2]) / 60 if unit == "dms" else 0)
-        assert value * 360 / full == pytest.approx(bearing, abs=0.02)
 
 
 def test_declination_is_applied_once_and_the_users_word_counts(open_page: Open) -> None:
@@ -311,15 +258,3 @@ def test_a_camera_that_is_refused_is_told_and_the_world_stays(open_page: Open) -
     page.locator("[name=view]").select_option("camera")
     page.locator("#notice", has_text="Showing the world").wait_for()
     assert _told(page, "view") == "world"
-
-
-def test_a_phone_sized_page_has_everything_within_reach(open_page: Open) -> None:
-    page, _ = open_page(viewport={"width": 390, "height": 780}, has_touch=True)
-    for element in page.locator("button:visible, summary:visible").all():
-        box = element.bounding_box()
-        assert box is not None
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= 390
-        assert box["y"] + box["height"] <= 780
-        assert min(box["width"], box["height"]) >= 24
-    assert page.evaluate("() => document.documentElement.scrollWidth") == 390

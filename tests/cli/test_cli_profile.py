@@ -93,7 +93,7 @@ def test_the_paper_s_table_is_the_modes_of_android() -> None:
 def test_there_is_a_step_a_run_and_one_for_idle() -> None:
     assert steps(modes=4, repeats=5) == 5 * 13
     assert steps(modes=4, repeats=5, command=["client"]) == 5 * 5
-    assert steps(modes=4, repeats=5, with_ar=True) == 5 * 17
+    assert steps(modes=4, repeats=5, with_ar=True) == 5 * 21
 
 
 def _observation(cpu: float, *, source: float = 0.0, client: float | None = None) -> Observation:
@@ -172,6 +172,7 @@ def test_the_json_has_the_figures_and_their_spreads(two_modes: Report) -> None:
         "ar_daemon_cpu_percent",
         "ar_server_cpu_percent",
         "ar_page_cpu_percent",
+        "ar_world_cpu_percent",
     }
     assert found["modes"]["GAME"]["ar_cpu_percent"] is None
     assert spread["daemon_cpu_percent"] == 0.5
@@ -188,12 +189,14 @@ def test_the_table_marks_what_does_not_differ(two_modes: Report) -> None:
 def test_the_ar_application_is_the_sum_of_its_parts() -> None:
     runs = _runs("GAME", (1.5, 1.75, 2.0))
     runs.ar = [replace(_observation(2.25, client=1.5), page=Usage(page, 30.0, 300.0)) for page in (20.0, 21.0, 25.0)]
+    runs.ar_world = [replace(one, page=Usage(70.0, 60.0, 300.0)) for one in runs.ar]
     made = report({"GAME": runs})
     game = made.modes["GAME"]
     assert game.ar_daemon_cpu_percent == Repeated(2.0, 0.0)
     assert game.ar_server_cpu_percent == Repeated(1.5, 0.0)
     assert game.ar_page_cpu_percent == Repeated(21.0, 5.0)
     assert game.ar_cpu_percent == Repeated(24.5, 5.0)
+    assert game.ar_world_cpu_percent == Repeated(73.5, 0.0)
     cells = {row[0]: row[1:] for row in table.rows(made)}
     assert cells["AR application CPU %"] == ["24.5 (5.0)"]
     assert cells["the paper's CPU %"] == ["13"]
@@ -280,6 +283,7 @@ def test_the_ar_application_is_measured(tmp_path: Path, browser_path: str) -> No
     parts = [game[f"ar_{part}cpu_percent"] for part in ("daemon_", "server_", "page_")]
     assert min(parts) > 0
     assert game["ar_cpu_percent"] == pytest.approx(sum(parts), abs=1e-3)
+    assert game["ar_world_cpu_percent"] > 0
     assert list(tmp_path.iterdir()) == []
 
 

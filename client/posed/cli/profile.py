@@ -48,7 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = """\
 Each mode gets a daemon of its own, out of sight of yours, and in turn a client that takes the pose at 10 Hz, one that
 takes accelerometer, gyroscope and magnetic field each as it happens, and one that takes them 100 ms late at most. The
-modes alternate, repeat by repeat: five minutes with the default modes, seconds and repeats. A replay is looped.
+modes alternate, repeat by repeat: five minutes with the default modes, seconds and repeats, and eight more with
+--with-ar. A replay is looped.
 
 -- CMD runs your own client, stopped after each run; {mode} in it becomes the mode's name, and without that it chooses
 its mode itself. It finds the daemon by XDG_RUNTIME_DIR. Its CPU is that of all the processes it starts.

@@ -1,21 +1,7 @@
 /**
  * The AR page: brings together what comes from the server, what the user does, and what is drawn.
  *
- * For tests, and for users at the browser's console, `window.posedAr` tells what is drawn; all of it is read-only:
- *
- * labels        [{id, name, x, y, visible, truth: {x, y, visible} | null}], nearest first: where the corrected pose
- *               puts each place on the screen (CSS pixels; NaN behind the camera), and where the truth does
- * pose          {sequence, rateMode, headingAccuracyDeg, status, missed, isStale, hz} | null
- * camera        {width, height, fovDeg, rotation, f}; pixels, degrees
- * attitude      {heading, pitch, roll} of the camera by the corrected pose, degrees, true north
- * registration  {deg, px} at the target if it is on the screen, else in the middle; NaN without a truth
- * delay         {publishedToDrawnMs, ageWhenDrawnMs, clockErrorMs} of the newest pose
- * script        {p50, p95, frames}: ms a frame took, of the last 240; frames drawn since the page was opened
- * link          {state, reason} of the way to the daemon
- * target        {id, name, held, bearing, elevation, distance} | null; degrees, m
- * declination   {deg, source}
- * correction    {name, headingOffsetDeg, position}
- * view          "world", "panorama", "photo" or "camera"
+ * `window.posedAr` tells tests, and users at the browser's console, what is drawn: see told.js.
  */
 
 import { Live } from "/web/live.js";
@@ -31,7 +17,8 @@ import { Readout, notify } from "./readout.js";
 import { Scene } from "./scene.js";
 import { SettingsPanel } from "./settings-panel.js";
 import { listenTo } from "./stage.js";
-import { Target } from "./target.js";
+import { Target, sightOf } from "./target.js";
+import { told } from "./told.js";
 
 const DEGREE = Math.PI / 180;
 const READ_EVERY_MS = 200;
@@ -47,8 +34,8 @@ const stage = document.querySelector("#stage");
 const overlay = document.querySelector("#overlay");
 
 let isNewPose = false;
-let publishedToDrawnMs = NaN;
-let ageWhenDrawnMs = NaN;
+/** Of the newest pose, ms. */
+const delay = { publishedToDrawn: NaN, ageWhenDrawn: NaN };
 
 const pace = new Pace(() => {
   const isNew = isNewPose;
@@ -56,8 +43,8 @@ const pace = new Pace(() => {
   const goesOn = frame.draw(live.bootMs(), isNew);
   if (isNew && scene.pose !== null) {
     const drawnAt = live.bootMs();
-    publishedToDrawnMs = drawnAt - scene.pose.b;
-    ageWhenDrawnMs = drawnAt - scene.pose.t;
+    delay.publishedToDrawn = drawnAt - scene.pose.b;
+    delay.ageWhenDrawn = drawnAt - scene.pose.t;
   }
   return goesOn;
 });
@@ -83,7 +70,7 @@ const live = new Live("/live", {
       pace.wake();
     },
     t: (truth) => {
-      scene.takeTruth(truth, performance.now());
+      scene.takeTruth(truth);
       pace.wake();
     },
     o: (observer) => {
@@ -150,8 +137,8 @@ function read() {
       pose,
       isStale,
       hz,
-      ageMs: ageWhenDrawnMs,
-      delayMs: publishedToDrawnMs,
+      ageMs: delay.ageWhenDrawn,
+      delayMs: delay.publishedToDrawn,
       registration: frame.registration,
       truthNote: isStale ? "stale" : frame.truthNote,
       correction: scene.describeCorrection(),
@@ -202,7 +189,7 @@ function record() {
   }
   const { place } = target;
   const { heading, pitch } = frame.attitude;
-  const sight = place === null ? { bearing: heading, elevation: pitch, distance: null } : frame.sight;
+  const sight = place === null ? { bearing: heading, elevation: pitch, distance: null } : sightOf(place, frame.eye);
   const words = book.record({
     time: new Date().toISOString(),
     name: place?.name ?? "",
@@ -301,52 +288,7 @@ async function fetchJson(path) {
   return response.json();
 }
 
-function whereTruly({ anchor: [e, n, u] }) {
-  const to = frame.background.projector;
-  const isAhead = to.point(e, n, u);
-  return { x: isAhead ? to.x : NaN, y: isAhead ? to.y : NaN, visible: isAhead && to.isOnScreen() };
-}
-
-const told = {
-  labels: () =>
-    frame.overlay.drawn.map((dot, i) => ({
-      ...dot,
-      truth: frame.truthNote === null ? whereTruly(scene.places.all[i]) : null,
-    })),
-  pose: () =>
-    scene.pose && {
-      sequence: scene.pose.n,
-      rateMode: scene.pose.m,
-      headingAccuracyDeg: scene.pose.a,
-      status: scene.pose.s,
-      missed: scene.pose.x,
-      isStale: scene.isStale(performance.now()),
-      hz: scene.measuredHz(performance.now()),
-    },
-  camera: () => {
-    const { width, height, fovDeg, rotation, f } = scene.camera;
-    return { width, height, fovDeg, rotation, f };
-  },
-  attitude: () => Object.fromEntries(Object.entries(frame.attitude).map(([key, rad]) => [key, rad / DEGREE])),
-  registration: () => ({ ...frame.registration }),
-  delay: () => ({ publishedToDrawnMs, ageWhenDrawnMs, clockErrorMs: live.offsetErrorMs }),
-  script: () => ({ ...pace.script(), frames: pace.frames }),
-  link: () => ({ ...scene.link }),
-  target: () => {
-    const { bearing, elevation, distance } = frame.sight;
-    const { place, isHeld: held } = target;
-    return place && { id: place.id, name: place.name, held, bearing: bearing / DEGREE, elevation: elevation / DEGREE, distance };
-  },
-  declination: () => ({ deg: scene.declination.angle / DEGREE, source: scene.declination.source }),
-  correction: () => {
-    const { name, headingOffset, position } = scene.correction;
-    return { name, headingOffsetDeg: headingOffset / DEGREE, position };
-  },
-  view: () => frame.background.view,
-};
-window.posedAr = Object.freeze(
-  Object.defineProperties({}, Object.fromEntries(Object.entries(told).map(([key, get]) => [key, { get, enumerable: true }]))),
-);
+window.posedAr = told({ scene, target, frame, live, pace, delay });
 
 resize();
 stage.focus();

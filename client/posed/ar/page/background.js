@@ -16,7 +16,7 @@ export class Background {
     this._canvas = stage.querySelector("#view");
     this._video = stage.querySelector("#camera");
     this._photo = stage.querySelector("#photo");
-    this._context = this._canvas.getContext("2d", { alpha: true });
+    this._context = this._canvas.getContext("2d", { alpha: false });
     this._tell = tell;
     /** Aimed by the truth. */
     this.projector = new Projector();

@@ -102,7 +102,8 @@ function drawLabel(name, detail, isTarget, scale, longest) {
   const nameWidth = Math.ceil(context.measureText(shown).width);
   context.font = detailFont;
   const detailWidth = Math.ceil(context.measureText(detail).width);
-  const width = 9 + nameWidth + 7 + detailWidth + 9;
+  const gap = detail === "" ? 0 : 7;
+  const width = 9 + nameWidth + gap + detailWidth + 9;
   canvas.width = Math.ceil(width * scale);
   canvas.height = Math.ceil(LABEL_HEIGHT * scale);
   context.scale(scale, scale);
@@ -121,8 +122,8 @@ function drawLabel(name, detail, isTarget, scale, longest) {
   context.textAlign = "left";
   const direction = directionOf(name);
   // A name that runs right to left comes first at the right, and its distance follows at the left.
-  const nameX = direction === "rtl" ? 9 + detailWidth + 7 : 9;
-  const detailX = direction === "rtl" ? 9 : 9 + nameWidth + 7;
+  const nameX = direction === "rtl" ? 9 + detailWidth + gap : 9;
+  const detailX = direction === "rtl" ? 9 : 9 + nameWidth + gap;
   context.direction = direction;
   context.font = nameFont;
   context.fillStyle = WHITE;

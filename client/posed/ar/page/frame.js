@@ -86,7 +86,7 @@ export class Frame {
     const isMoving = this._drawBackground(byPose, bootMs, isForced);
     if (byPose === null) return isMoving;
     if (isNewPose || isForced || isAhead) this._drawOverlay(byPose);
-    this._measure(truth, isAhead && scene.truthIsLate(bootMs));
+    this._measure(truth, scene.truthIsLost(bootMs));
     return isMoving || (isAhead && Math.hypot(...pose.w) > 1e-3);
   }
 
@@ -127,10 +127,10 @@ export class Frame {
     this.sight = this._target.place === null ? NO_SIGHT : sightOf(this._target.place, this.eye);
   }
 
-  _measure(truth, isLate) {
+  _measure(truth, isLost) {
     if (!this.background.isDrawn) this.truthNote = "no truth in this view";
     else if (truth === null) this.truthNote = "no truth";
-    else if (isLate) this.truthNote = "the truth is late";
+    else if (isLost) this.truthNote = "truth lost";
     else {
       this.truthNote = null;
       measure(this.projector, this.background.projector, this._target.place, this.registration);

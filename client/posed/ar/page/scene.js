@@ -2,6 +2,7 @@
 
 import { format } from "./angles.js";
 import { Camera } from "./camera.js";
+import { fromEnu } from "./geodesy.js";
 import { aboutUp, conjugate, extrapolate, multiply } from "./quaternion.js";
 import { Places } from "./places.js";
 
@@ -9,6 +10,7 @@ const DEGREE = Math.PI / 180;
 const STALE_AFTER_MS = 500;
 // The truth comes every 20 ms; after a silence the drawn world stops rather than drift away.
 const LONGEST_TRUTH_STEP_S = 0.1;
+const TRUTH_LOST_AFTER_MS = 150;
 // At 10 Hz a pose is at most some 130 ms old when drawn; beyond this the pose counts as lost.
 const LONGEST_POSE_STEP_S = 0.5;
 const PACE_KEPT = 16;
@@ -27,7 +29,6 @@ export class Scene {
     this.pose = null;
     this.poseAt = -Infinity;
     this.truth = null;
-    this.truthAt = -Infinity;
     this.observer = null;
     this._start = null;
     this._previousTruth = null;
@@ -46,8 +47,7 @@ export class Scene {
     this._arrivals[this._arrived++ % PACE_KEPT] = at;
   }
 
-  takeTruth(truth, at) {
-    this.truthAt = at;
+  takeTruth(truth) {
     if (this._frozen !== null) return;
     this._previousTruth = this.truth;
     this.truth = truth;
@@ -72,7 +72,10 @@ export class Scene {
 
   takeObserver(place) {
     this.observer = place;
-    this._start ??= place;
+    // The truth's path begins at a position that was stated; a measured one is where it has come to.
+    const gone = this.truth?.e ?? [0, 0, 0];
+    if (place.source === "fixed") this._start = place;
+    else this._start ??= fromEnu(place, gone.map((metres) => -metres));
   }
 
   /** Poses a second, from the arrivals of the last 16; NaN before the second, 0 when they have stopped. */
@@ -91,10 +94,6 @@ export class Scene {
 
   isStale(now) {
     return now - this.poseAt > STALE_AFTER_MS;
-  }
-
-  hasTruth(now) {
-    return now - this.truthAt < STALE_AFTER_MS;
   }
 
   /** Declination in rad (east positive) and where it is from. */
@@ -157,9 +156,9 @@ export class Scene {
     return parts.join(", ");
   }
 
-  /** Whether the truth is too old to go on from, and so stands still. */
-  truthIsLate(bootMs) {
-    return this.truth !== null && bootMs - this.truth.t > 1000 * LONGEST_TRUTH_STEP_S;
+  /** Whether the truth has stopped, as motion capture's does where it loses the phone: the world stands still. */
+  truthIsLost(bootMs) {
+    return this.truth !== null && !this.isFrozen && bootMs - this.truth.t > TRUTH_LOST_AFTER_MS;
   }
 
   /** Fit the camera to a window of so many CSS pixels. */

@@ -19,6 +19,10 @@ from posed.errors import PosedError
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WINDOW = (1280, 720)
+_PICTURE = (
+    f'<svg xmlns="http://www.w3.org/2000/svg" width="{WINDOW[0]}" height="{WINDOW[1]}">'
+    '<rect width="100%" height="100%" fill="gray"/></svg>'
+)
 _LINK_TIMEOUT_S = 20.0
 # A page's first seconds are those of compiling its script and filling its caches.
 _SETTLE_S = 4.0
@@ -33,11 +37,16 @@ def find_browser() -> str:
 
 
 class ArApplication:
-    """`posed ar` and a browser with its page; leaving the `with` block ends both."""
+    """`posed ar` and a browser with its page; leaving the `with` block ends both.
 
-    def __init__(self, daemon: Daemon, mode: str) -> None:
+    Over a still picture, as over a camera's, the page draws the overlay with each pose; a drawn world is drawn anew
+    with each frame of the display, and needs the truth 50 times a second.
+    """
+
+    def __init__(self, daemon: Daemon, mode: str, *, drawn_world: bool) -> None:
         self._daemon = daemon
         self._mode = mode
+        self._drawn_world = drawn_world
         self._directory = Path(tempfile.mkdtemp(prefix="posed-ar-"))
         self._server: subprocess.Popen[bytes] | None = None
         self._browser: subprocess.Popen[bytes] | None = None
@@ -46,6 +55,10 @@ class ArApplication:
         try:
             words = [sys.executable, "-m", "posed.cli", "ar", "--port=0", f"--mode={self._mode}"]
             words.append(f"--corrections={self._directory / 'corrections.json'}")
+            if not self._drawn_world:
+                picture = self._directory / "grey.svg"
+                picture.write_text(_PICTURE)
+                words.append(f"--photo={picture}")
             self._server = self._start(words)
             link = self._next_link()
             self._browser = self._start(self._browser_words(link))

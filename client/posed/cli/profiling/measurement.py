@@ -50,6 +50,7 @@ class ModeRuns:
     batched: list[Observation] = field(default_factory=list)
     raw: list[Received] = field(default_factory=list)
     ar: list[Observation] = field(default_factory=list)
+    ar_world: list[Observation] = field(default_factory=list)
 
 
 def measure(
@@ -83,11 +84,13 @@ def measure(
             else:
                 client = Workload.poses(daemon, MODES[mode])
             _run(daemon, client, seconds, results[mode].pose, results[mode].poses)
-        if with_ar:
+        for drawn_world in (False, True) if with_ar else ():
             for mode, daemon in daemons.items():
                 progress(f"{repeat}/{repeats} {mode} AR")
-                with ArApplication(daemon, mode) as application:
-                    results[mode].ar += observe([daemon], seconds, application.read_server, application.read_page)
+                runs = results[mode]
+                observations = runs.ar_world if drawn_world else runs.ar
+                with ArApplication(daemon, mode, drawn_world=drawn_world) as application:
+                    observations += observe([daemon], seconds, application.read_server, application.read_page)
         if command:
             continue
         for kind, latency_us in (("streaming", 0), ("batched", BATCH_LATENCY_US)):
@@ -101,7 +104,7 @@ def measure(
 
 def steps(modes: int, repeats: int, command: Sequence[str] = (), *, with_ar: bool = False) -> int:
     """Return how many steps `measure` has."""
-    return repeats * (1 + modes * ((1 if command else 3) + with_ar))
+    return repeats * (1 + modes * ((1 if command else 3) + 2 * with_ar))
 
 
 def observe(daemons: Sequence[Daemon], seconds: float, *clients: Callable[[], Reading]) -> list[Observation]:

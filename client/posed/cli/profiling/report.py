@@ -85,6 +85,8 @@ class ModeReport:
     ar_page_cpu_percent: Repeated | None
     ar_cpu_percent: Repeated | None
     """Daemon, server and page together."""
+    ar_world_cpu_percent: Repeated | None
+    """The same with the drawn world in place of a picture."""
     modes_in_force: tuple[str, ...]
     """What the poses of our client said; more or other than the mode if somebody else asked for a faster one."""
 
@@ -176,6 +178,7 @@ def _mode_report(mode: str, runs: ModeRuns) -> ModeReport:
         ar_server_cpu_percent=Repeated.of(map(client_cpu, runs.ar)) if runs.ar else None,
         ar_page_cpu_percent=Repeated.of(map(page_cpu, runs.ar)) if runs.ar else None,
         ar_cpu_percent=above_idle(runs.ar, ar_cpu) if runs.ar else None,
+        ar_world_cpu_percent=above_idle(runs.ar_world, ar_cpu) if runs.ar_world else None,
         modes_in_force=tuple(sorted({name for got in runs.poses for name in got.modes})),
     )
 
