@@ -27,7 +27,9 @@ _ALLOWED = {
     "client": {"errors", "binder", "proto"},
     "web": {"errors"},
     "ar": {"errors", "client", "web"},
-    "cli": _LEAVES | {"hal", "sensors", "fusion", "evaluation", "daemon", "client", "binder", "proto", "web", "ar"},
+    "verify": {"errors", "client"},
+    "cli": _LEAVES
+    | {"hal", "sensors", "fusion", "evaluation", "daemon", "client", "binder", "proto", "web", "ar", "verify"},
 }
 _WITHOUT_ZMQ = {"errors", "version", "proto", "events", "clock", "hal", "fusion", "sensors", "evaluation"}
 

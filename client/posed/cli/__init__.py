@@ -30,6 +30,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "fuse": ("posed.cli.fuse", "turn a recording into poses, without a daemon"),
     "evaluate": ("posed.cli.evaluate", "compare filters on recordings with truth"),
     "ar": ("posed.cli.ar", "open the AR page: georeferenced places held in place by the pose"),
+    "verify": ("posed.cli.verify", "verify the running daemon as Android verifies a phone's sensors"),
     "profile": ("posed.cli.profile", "measure the CPU that each rate mode costs"),
 }
 

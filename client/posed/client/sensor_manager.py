@@ -13,6 +13,7 @@ from posed.client.event_stream import EventStream
 from posed.client.handler import Handler
 from posed.client.package import Package
 from posed.client.registry import ListenerRegistry
+from posed.client.rotation import SensorMaths
 from posed.client.sensor import (
     DynamicSensorCallback,
     Sensor,
@@ -53,7 +54,7 @@ _RATE_CAPPED = frozenset(
 _CAPPED_PERIOD_US = 5_000
 
 
-class SensorManager:
+class SensorManager(SensorMaths):
     """The sensors of a running posed. Callbacks run on a thread of the manager's own, or on a Handler's.
 
     The registrations survive a daemon that crashes or is restarted: they are made again at the next connection.

@@ -1,0 +1,41 @@
+"""The whole suite as a list of steps, run one by one."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from posed.client.sensor import Sensor
+from posed.verify.behaviour import Behaviour
+from posed.verify.finding import Finding
+from posed.verify.matrix import RATES_HZ, Conditions, points, run_point
+from posed.verify.sensor_list import verify_sensor_list
+from posed.verify.source import EventSource, SuiteClock
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What takes a while, and what it is called meanwhile."""
+
+    name: str
+    run: Callable[[], Sequence[Finding]]
+
+
+def steps(
+    source: EventSource,
+    clock: SuiteClock,
+    sensors: Sequence[Sensor],
+    rates_hz: Sequence[float] = RATES_HZ,
+    conditions: Conditions | None = None,
+) -> Iterator[Step]:
+    """Yield the steps of the suite for these sensors: the list, the matrix, then the behaviours of each."""
+    yield Step("sensor list", partial(verify_sensor_list, list(sensors)))
+    for point in points(sensors, rates_hz):
+        yield Step(point.name, partial(run_point, source, clock, point, conditions or Conditions()))
+    for sensor in sensors:
+        for name, verify in Behaviour(source, clock, sensor).verifications().items():
+            subject = sensor.string_type.removeprefix("android.sensor.")
+            yield Step(f"{name} {subject}", partial(_listed, verify))
+
+
+def _listed(verify: Callable[[], Iterator[Finding]]) -> list[Finding]:
+    return list(verify())
