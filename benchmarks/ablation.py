@@ -1,7 +1,7 @@
 """What each ingredient of dcm-adaptive pays, and what half and double of each parameter cost.
 
     python benchmarks/ablation.py               # needs POSED_DATA and the extra `evaluate`; minutes when compiled
-    python benchmarks/ablation.py parameters
+    python benchmarks/ablation.py parameters    # at GAME and NORMAL only: native says what GAME says
 
 The filter runs over the trials of BROAD and of the smartphone attitude data set, with one thing changed at a time.
 Printed is the mean total error in degrees by BROAD's definition at each mode, behind the stroke that of the
@@ -107,18 +107,20 @@ def main() -> int:
     data = os.environ.get("POSED_DATA")
     if data is None:
         sys.exit("set POSED_DATA to the folder of recordings")
-    variants = parameters() if sys.argv[1:] == ["parameters"] else ABLATIONS
+    halve = sys.argv[1:] == ["parameters"]
+    variants = parameters() if halve else ABLATIONS
+    modes: tuple[ModeName, ...] = ("GAME", "NORMAL") if halve else MODES
     made = {name: changed(AdaptiveParams(), changes) for name, changes in variants.items()}
     folders = [Path(data) / name for name in ("broad", "smartphone-attitude")]
     found: dict[tuple[str, str, ModeName], list[Errors]] = {}
     for path in find_trials(folders):
         trial = load_trial(path)
         print(trial.name, file=sys.stderr, flush=True)
-        for mode in MODES:
+        for mode in modes:
             events = mode_events(trial, mode)
             for name, params in made.items():
                 found.setdefault((name, trial.dataset, mode), []).append(errors(trial, events, params))
-    columns = [(dataset, mode) for dataset in dict.fromkeys(key[1] for key in found) for mode in MODES]
+    columns = [(dataset, mode) for dataset in dict.fromkeys(key[1] for key in found) for mode in modes]
     print(f"{'':<52}" + "".join(f"{dataset[:5]:>7} {mode:<7}" for dataset, mode in columns))
     reference = None
     for name in made:

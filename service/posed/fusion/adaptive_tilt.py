@@ -16,7 +16,7 @@ from posed.fusion.filter import require_positive
 class TiltParams:
     """How fast the tilt follows the accelerometer."""
 
-    time_s: float = 3.0
+    time_s: float = 3.5
     """s, time constant. Shorter follows linear acceleration, longer the gyroscope's errors."""
     damping: float = sqrt(0.5)
     """Of the low-pass; sqrt(1/2) is Butterworth's. Far above 1 it is a low-pass of the first order."""
