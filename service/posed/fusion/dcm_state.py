@@ -10,6 +10,7 @@ from posed.events import STANDARD_GRAVITY
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.filter import SensorNoise, require_positive
 from posed.fusion.gate import GateParams, GateState
+from posed.fusion.held import MAX_HELD, HeldEvents
 from posed.fusion.rest import RestParams, RestState
 
 
@@ -78,7 +79,7 @@ class DcmState:
     events: int = 0
     bad_samples: int = 0
     gaps: int = 0
-    held: list[tuple[int, int, float, float, float]] = field(default_factory=list)
+    held: HeldEvents = field(default_factory=HeldEvents)
     rest: RestState = field(default_factory=RestState)
     gate: GateState = field(default_factory=GateState)
 
@@ -89,7 +90,7 @@ class DcmState:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the state as dicts, lists, numbers and booleans."""
-        return asdict(self) | {"held": [list(event) for event in self.held]}
+        return {each.name: _plain(getattr(self, each.name)) for each in fields(self)}
 
     @classmethod
     def from_dict(cls, saved: Any) -> "DcmState":
@@ -98,6 +99,12 @@ class DcmState:
 
 
 _T = TypeVar("_T")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, HeldEvents):
+        return [list(event) for event in value.events()]
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def _filled(kind: type[_T], saved: Any, path: str) -> _T:
@@ -113,22 +120,25 @@ def _filled(kind: type[_T], saved: Any, path: str) -> _T:
         value = saved[name]
         if is_dataclass(default):
             value = _filled(type(default), value, f"{path}.{name}")
-        elif isinstance(default, list):
-            value = _events(value, f"{path}.{name}")
+        elif isinstance(default, HeldEvents):
+            value = _held(value, f"{path}.{name}")
         elif not _fits(value, default):
             raise _misfit(f"{path}.{name}", value)
         setattr(blank, name, value)
     return cast(_T, blank)
 
 
-def _events(saved: Any, path: str) -> list[tuple[int, int, float, float, float]]:
+def _held(saved: Any, path: str) -> HeldEvents:
     blank = (0, 0, 0.0, 0.0, 0.0)
-    if not isinstance(saved, list):
+    if not isinstance(saved, list) or len(saved) > MAX_HELD:
         raise _misfit(path, saved)
+    held = HeldEvents()
     for event in saved:
         if not isinstance(event, list) or len(event) != len(blank) or not all(map(_fits, event, blank)):
             raise _misfit(path, event)
-    return [tuple(event) for event in saved]
+        sensor_type, timestamp_ns, x, y, z = event
+        held.add(sensor_type, timestamp_ns, x, y, z)
+    return held
 
 
 def _fits(value: Any, default: Any) -> bool:
