@@ -113,7 +113,7 @@ EXPECTED: dict[tuple[SensorType, Fault], tuple[float, FilterStatus, FilterStatus
     (MAG, Fault.REORDERED): (1.0, NONE, GAP),
     (MAG, Fault.DUPLICATED): (1.0, GAP, GAP),
 }
-AFTER_DEG = 2.0
+AFTER_DEG = 3.0
 """Five seconds after any fault."""
 
 

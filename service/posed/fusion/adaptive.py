@@ -31,7 +31,7 @@ from posed.fusion.held import MAX_HELD
 from posed.fusion.rest import RestBias
 from posed.fusion.saved import filled, plain
 
-__all__ = ["AdaptiveFilter", "AdaptiveParams", "AdaptiveState"]
+__all__ = ["AdaptiveFilter", "AdaptiveParams"]
 
 _ACCELEROMETER = int(SensorType.ACCELEROMETER)
 _MAGNETIC_FIELD = int(SensorType.MAGNETIC_FIELD)
