@@ -43,3 +43,7 @@ class AlreadyRunningError(PosedError):
 
 class RuntimeDirectoryError(PosedError):
     """The runtime directory or something in it is not safe to use."""
+
+
+class StaleKernelError(PosedError):
+    """The compiled filters were made from other sources than those that lie beside them."""

@@ -13,7 +13,8 @@ from test_dcm_properties import streams
 from posed.errors import InvalidArgumentError
 from posed.events import SensorType
 from posed.fusion import make_filter
-from posed.fusion.adaptive import AdaptiveFilter, AdaptiveState
+from posed.fusion.adaptive import AdaptiveFilter
+from posed.fusion.adaptive_state import AdaptiveState
 
 FORMS = st.sampled_from(["dcm-adaptive", "game", "geomag"])
 

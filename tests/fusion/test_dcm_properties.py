@@ -11,7 +11,8 @@ from synthetic_phone import FASTEST, GAME, FlatEvents, rotation, sense
 
 from posed.errors import InvalidArgumentError
 from posed.events import SensorType
-from posed.fusion.dcm import DcmFilter, DcmState
+from posed.fusion.dcm import DcmFilter
+from posed.fusion.dcm_state import DcmState
 
 KINDS = np.array([SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD, SensorType.GYROSCOPE], np.int64)
 

@@ -1,6 +1,10 @@
 """Orientation filters: one protocol, and a table from which one is chosen by name."""
 
-from posed.fusion.filter import OrientationFilter, SensorNoise
-from posed.fusion.table import FILTERS, PACKAGED, make_filter
+from posed.fusion import kernel
+
+kernel.prepare()
+
+from posed.fusion.filter import OrientationFilter, SensorNoise  # noqa: E402
+from posed.fusion.table import FILTERS, PACKAGED, make_filter  # noqa: E402
 
 __all__ = ["FILTERS", "PACKAGED", "OrientationFilter", "SensorNoise", "make_filter"]

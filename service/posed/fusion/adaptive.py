@@ -31,7 +31,7 @@ from posed.fusion.held import MAX_HELD
 from posed.fusion.rest import RestBias
 from posed.fusion.saved import filled, plain
 
-__all__ = ["AdaptiveFilter", "AdaptiveParams", "AdaptiveState"]
+__all__ = ["AdaptiveFilter", "AdaptiveParams"]
 
 _ACCELEROMETER = int(SensorType.ACCELEROMETER)
 _MAGNETIC_FIELD = int(SensorType.MAGNETIC_FIELD)
@@ -217,9 +217,11 @@ class AdaptiveFilter:
 
     def _take_rate(self, t: int, x: float, y: float, z: float) -> None:
         s = self.state
-        interval = s.interval
-        if x != interval.rate_x or y != interval.rate_y or z != interval.rate_z or not s.has_gyro:
+        if x != s.gyro_x or y != s.gyro_y or z != s.gyro_z or not s.has_gyro:
             s.gyro_changed_ns = t
+            s.gyro_x = x
+            s.gyro_y = y
+            s.gyro_z = z
         elif t - s.gyro_changed_ns > _MAX_STEP_NS and x * x + y * y + z * z > 0.0:
             self._flag_bad_sample()
             return
@@ -241,6 +243,7 @@ class AdaptiveFilter:
         elif s.gyro_lost:
             # Measurements that went on alone may have passed the first sample of a gyroscope that came back.
             s.gyro_lost = False
+            self._tilt.resume()
             self._bias.start_rows(s.matrix)
         s.has_gyro = True
         self._interval.begin(x, y, z)

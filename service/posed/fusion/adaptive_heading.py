@@ -20,7 +20,7 @@ class HeadingParams:
     """rad2/Hz, how far a believed field points from magnetic north. Larger trusts the gyroscope longer."""
     bias_s: float = 3.0
     """s for which an error of the bias counts as one and the same."""
-    lost_density: float = 0.5
+    lost_density: float = 2.0
     """rad/s/sqrt(Hz), how the phone turns while there is no gyroscope. Larger follows faster."""
 
     def __post_init__(self) -> None:

@@ -143,8 +143,8 @@ class GyroInterval:
         """Answer with (x, y, z) turned by the rotation vector t (rad): Rodrigues."""
         angle2 = tx * tx + ty * ty + tz * tz
         if angle2 < 1e-3:
-            a = 1.0 - angle2 * (1 / 6 - angle2 * (1 / 120))
-            b = 0.5 - angle2 * (1 / 24 - angle2 * (1 / 720))
+            a = 1.0 - angle2 * (1.0 / 6.0 - angle2 * (1.0 / 120.0))
+            b = 0.5 - angle2 * (1.0 / 24.0 - angle2 * (1.0 / 720.0))
         else:
             angle = sqrt(angle2)
             a = sin(angle) / angle

@@ -61,6 +61,9 @@ class AdaptiveState:
     has_gyro: bool = False
     gyro_ns: int = 0
     gyro_changed_ns: int = 0
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
     gyro_lost: bool = False
     has_acc: bool = False
     acc_ns: int = 0

@@ -16,7 +16,7 @@ from posed.fusion.filter import require_positive
 class TiltParams:
     """How fast the tilt follows the accelerometer."""
 
-    time_s: float = 3.0
+    time_s: float = 3.5
     """s, time constant. Shorter follows linear acceleration, longer the gyroscope's errors."""
     damping: float = sqrt(0.5)
     """Of the low-pass; sqrt(1/2) is Butterworth's. Far above 1 it is a low-pass of the first order."""
@@ -26,7 +26,7 @@ class TiltParams:
     The time constant T follows 1/T^2 = 1/time_s^2 + (that rotation's variance per second) / interval_noise.
     Smaller follows the accelerometer faster below 15 Hz, and nothing changes above.
     """
-    lost_s: float = 0.2
+    lost_s: float = 0.1
     """s, time constant while there is no gyroscope. Longer smooths and lags."""
 
     def __post_init__(self) -> None:
@@ -71,6 +71,12 @@ class Tilt:
         s.slope_x = s.slope_y = s.slope_z = 0.0
         s.turn_x = s.turn_y = 0.0
         s.frequency = 0.0
+
+    def resume(self) -> None:
+        """Go on with a gyroscope that came back: what the fast average followed was the phone, not its errors."""
+        s = self.state
+        s.slope_x = s.slope_y = s.slope_z = 0.0
+        s.age_s = min(s.age_s, self._lost_s)
 
     def level(
         self, c: DirectionCosines, x: float, y: float, z: float, dt: float, lost: bool, interval_error: float

@@ -22,9 +22,10 @@ from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
 from posed.fusion.dcm_state import DcmParams, DcmState
 from posed.fusion.gate import MagneticGate
+from posed.fusion.held import MAX_HELD
 from posed.fusion.rest import RestBias
 
-__all__ = ["DcmFilter", "DcmParams", "DcmState"]
+__all__ = ["DcmFilter", "DcmParams"]
 
 _ACCELEROMETER = int(SensorType.ACCELEROMETER)
 _MAGNETIC_FIELD = int(SensorType.MAGNETIC_FIELD)
@@ -42,8 +43,9 @@ _MAX_STEP_NS = 500_000_000
 _MAX_STEP_S = 0.5
 _FIRST_STEP_S = 0.02
 """What the first sample of a sensor stands for: GAME's period, for want of a predecessor."""
-_MAX_HELD = 1024
-"""Held measurements at most: half a second at 2 kHz. A source that stamps every sample alike would fill the memory."""
+_MAX_HELD = MAX_HELD
+_MAX_TIME_NS = 2**62
+"""A time further from zero (146 years) is none; the differences of all others fit 64 bits."""
 _UNKNOWN_HEADING = pi / sqrt(3.0)
 """rad, one sigma of a heading of which nothing is known (uniform over the circle)."""
 
@@ -83,13 +85,8 @@ class DcmFilter:
 
     def update_batch(self, events: Iterable[FlatEvent]) -> None:
         """Take events in the order given, each as by `update`."""
-        take = self._take
-        take_rate = self._take_rate
         for sensor_type, timestamp_ns, x, y, z in events:
-            if sensor_type == _GYROSCOPE:
-                take_rate(timestamp_ns, x, y, z)
-            else:
-                take(sensor_type, timestamp_ns, x, y, z)
+            self._take(sensor_type, timestamp_ns, x, y, z)
 
     def orientation(self) -> Orientation | None:
         """Return the orientation C stands for, None until gravity and north have been seen."""
@@ -140,13 +137,13 @@ class DcmFilter:
             self._take_rate(t, x, y, z)
         elif sensor_type != _ACCELEROMETER and sensor_type != _MAGNETIC_FIELD:
             return
-        elif not x * x + y * y + z * z < _MAX_MEASUREMENT2:
+        elif not (x * x + y * y + z * z < _MAX_MEASUREMENT2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
             self._flag_bad_sample()
         elif s.gyro_lost:
             self._measure_alone(sensor_type, t, x, y, z)
         elif not s.has_gyro or t > s.gyro_ns:
-            s.held.append((sensor_type, t, x, y, z))
-            if t - s.held[0][1] > _MAX_STEP_NS or len(s.held) > _MAX_HELD:
+            s.held.add(sensor_type, t, x, y, z)
+            if t - s.held.timestamp_ns[0] > _MAX_STEP_NS or s.held.count == _MAX_HELD:
                 self._lose_gyro()
         elif s.gyro_ns - t <= _MAX_STEP_NS:
             self._measure(sensor_type, t, x, y, z)
@@ -155,7 +152,7 @@ class DcmFilter:
 
     def _take_rate(self, t: int, x: float, y: float, z: float) -> None:
         s = self.state
-        if not x * x + y * y + z * z < _MAX_RATE2:
+        if not (x * x + y * y + z * z < _MAX_RATE2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
             self._flag_bad_sample()
             return
         came_back = s.gyro_lost
@@ -178,18 +175,19 @@ class DcmFilter:
         s.rate_x = x - rest.bias_x
         s.rate_y = y - rest.bias_y
         s.rate_z = z - rest.bias_z
-        if s.held:
-            held = s.held
-            s.held = []
-            for event in held:
-                time_ns = event[1]
-                if time_ns <= t:
-                    self._propagate_to(time_ns)
-                    self._measure(event[0], time_ns, event[2], event[3], event[4])
-                elif time_ns - t <= _MAX_STEP_NS:
-                    s.held.append(event)
-                else:
-                    self._flag_gap()
+        held = s.held
+        count = held.count
+        held.count = 0
+        for k in range(count):
+            time_ns = held.timestamp_ns[k]
+            if time_ns <= t:
+                self._propagate_to(time_ns)
+                self._measure(held.sensor_type[k], time_ns, held.x[k], held.y[k], held.z[k])
+            elif time_ns - t <= _MAX_STEP_NS:
+                # Still ahead: it moves up, never past a row not yet looked at.
+                held.add(held.sensor_type[k], time_ns, held.x[k], held.y[k], held.z[k])
+            else:
+                self._flag_gap()
         self._propagate_to(t)
         if dt > 0.0:
             self._rest.take_rate(x, y, z, dt)
@@ -200,9 +198,10 @@ class DcmFilter:
         s.rate_x = s.rate_y = s.rate_z = 0.0
         self._rest.moved()
         held = s.held
-        s.held = []
-        for event in held:
-            self._measure_alone(event[0], event[1], event[2], event[3], event[4])
+        count = held.count
+        held.count = 0
+        for k in range(count):
+            self._measure_alone(held.sensor_type[k], held.timestamp_ns[k], held.x[k], held.y[k], held.z[k])
 
     def _measure_alone(self, sensor_type: int, t: int, x: float, y: float, z: float) -> None:
         """Correct C without a gyroscope: the rotation nobody measured is noise."""
@@ -338,7 +337,7 @@ class DcmFilter:
         """
         s = self.state
         self._flag_gap()
-        s.held = []
+        s.held.count = 0
         s.time_ns = t
         s.has_up = False
         s.has_north = False

@@ -1,16 +1,15 @@
 """What the DCM filter is told (DcmParams) and all that it remembers (DcmState)."""
 
-import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, is_dataclass
-from typing import Any, TypeVar, cast
+from dataclasses import dataclass, field
+from typing import Any
 
-from posed.errors import InvalidArgumentError
 from posed.events import STANDARD_GRAVITY
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.filter import SensorNoise, require_positive
 from posed.fusion.gate import GateParams, GateState
+from posed.fusion.held import HeldEvents
 from posed.fusion.rest import RestParams, RestState
+from posed.fusion.saved import filled, plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +77,7 @@ class DcmState:
     events: int = 0
     bad_samples: int = 0
     gaps: int = 0
-    held: list[tuple[int, int, float, float, float]] = field(default_factory=list)
+    held: HeldEvents = field(default_factory=HeldEvents)
     rest: RestState = field(default_factory=RestState)
     gate: GateState = field(default_factory=GateState)
 
@@ -89,51 +88,10 @@ class DcmState:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the state as dicts, lists, numbers and booleans."""
-        return asdict(self) | {"held": [list(event) for event in self.held]}
+        saved: dict[str, Any] = plain(self)
+        return saved
 
     @classmethod
     def from_dict(cls, saved: Any) -> "DcmState":
         """Return the state that `to_dict` gave; raises InvalidArgumentError for anything else."""
-        return _filled(cls, saved, "state")
-
-
-_T = TypeVar("_T")
-
-
-def _filled(kind: type[_T], saved: Any, path: str) -> _T:
-    """Return a dataclass of scalars, events and further such dataclasses with the saved values in it."""
-    blank: Any = kind()
-    wanted = {each.name for each in fields(blank)}
-    if not isinstance(saved, Mapping):
-        raise _misfit(path, saved)
-    for name in sorted(wanted ^ saved.keys()):
-        raise _misfit(f"{path}.{name}", "missing" if name in wanted else "unknown")
-    for name in sorted(wanted):
-        default = getattr(blank, name)
-        value = saved[name]
-        if is_dataclass(default):
-            value = _filled(type(default), value, f"{path}.{name}")
-        elif isinstance(default, list):
-            value = _events(value, f"{path}.{name}")
-        elif not _fits(value, default):
-            raise _misfit(f"{path}.{name}", value)
-        setattr(blank, name, value)
-    return cast(_T, blank)
-
-
-def _events(saved: Any, path: str) -> list[tuple[int, int, float, float, float]]:
-    blank = (0, 0, 0.0, 0.0, 0.0)
-    if not isinstance(saved, list):
-        raise _misfit(path, saved)
-    for event in saved:
-        if not isinstance(event, list) or len(event) != len(blank) or not all(map(_fits, event, blank)):
-            raise _misfit(path, event)
-    return [tuple(event) for event in saved]
-
-
-def _fits(value: Any, default: Any) -> bool:
-    return type(value) is type(default) and (not isinstance(value, float) or math.isfinite(value))
-
-
-def _misfit(path: str, value: Any) -> InvalidArgumentError:
-    return InvalidArgumentError(f"the saved {path} is {value!r}, which is no state of this filter; start it afresh")
+        return filled(cls, saved, "state")

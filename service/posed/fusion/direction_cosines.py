@@ -40,8 +40,9 @@ class DirectionCosines:
         angle2 = x * x + y * y + z * z
         if angle2 < 1e-3:
             # Below 0.03 rad the series are exact to the last bit, cheaper, and free of the cancellation in 1 - cos.
-            a = 1.0 - angle2 * (1 / 6 - angle2 * (1 / 120 - angle2 * (1 / 5040)))
-            b = 0.5 - angle2 * (1 / 24 - angle2 * (1 / 720 - angle2 * (1 / 40320)))
+            # The points matter: compiled, 1 / 6 would be a division of integers.
+            a = 1.0 - angle2 * (1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 * (1.0 / 5040.0)))
+            b = 0.5 - angle2 * (1.0 / 24.0 - angle2 * (1.0 / 720.0 - angle2 * (1.0 / 40320.0)))
         else:
             angle = sqrt(angle2)
             a = sin(angle) / angle
@@ -184,11 +185,11 @@ class DirectionCosines:
 
         The largest of the four elements is found first and divides the others (Shepperd 1978), so none loses digits.
         """
-        xx = self.east_x
+        xx = self.north_y * self.up_z - self.north_z * self.up_y
         yy = self.north_y
         zz = self.up_z
-        east_y = self.east_y
-        east_z = self.east_z
+        east_y = self.north_z * self.up_x - self.north_x * self.up_z
+        east_z = self.north_x * self.up_y - self.north_y * self.up_x
         trace = xx + yy + zz
         x = self.up_y - self.north_z
         y = east_z - self.up_x

@@ -1,0 +1,143 @@
+"""What each ingredient of dcm-adaptive pays, and what half and double of each parameter cost.
+
+    python benchmarks/ablation.py               # needs POSED_DATA and the extra `evaluate`; minutes when compiled
+    python benchmarks/ablation.py parameters    # at GAME and NORMAL only: native says what GAME says
+
+The filter runs over the trials of BROAD and of the smartphone attitude data set, with one thing changed at a time.
+Printed is the mean total error in degrees by BROAD's definition at each mode, behind the stroke that of the
+inclination: in the first line as it is, in the others by how much the change makes it worse.
+"""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posed.evaluation.rates import ModeName, mode_events
+from posed.evaluation.scoring import Errors, Track, score
+from posed.evaluation.trial import Trial
+from posed.evaluation.trials import find_trials, load_trial
+from posed.events import FlatEvent, SensorType
+from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
+
+MODES: tuple[ModeName, ...] = ("native", "GAME", "UI", "NORMAL")
+_NEVER = 1e9
+_GYROSCOPE = int(SensorType.GYROSCOPE)
+
+ABLATIONS: dict[str, dict[str, object]] = {
+    "all of it": {},
+    "tilt of the first order": {"tilt.damping": 10.0},
+    "no faster tilt for slow gyroscopes": {"tilt.interval_noise": _NEVER},
+    "neither tilt nor heading faster for slow gyroscopes": {"interval.loss": 1e-9},
+    "rate constant within an interval (no coning)": {"interval.slope": False},
+    "measurements at the interval's end": {"interval.own_time": False},
+    "no sensor delays": {"gyro_delay_s": 0.0, "acc_delay_s": 0.0, "mag_delay_s": 0.0},
+    "no bias": {"bias.motion_std": _NEVER, "rest.settle_s": _NEVER},
+    "no bias at rest": {"rest.settle_s": _NEVER},
+    "no bias in motion": {"bias.motion_std": _NEVER},
+    "no faster heading for a doubted bias": {"heading.bias_s": 1e-9},
+    "no gate on magnetic disturbance": {"earth.norm_tolerance": _NEVER, "earth.dip_tolerance": _NEVER},
+    "no mean and no wait in the gate": {"earth.mean_s": 1e-9, "earth.settle_s": 1e-9},
+    "no new reference": {"earth.candidate_s": _NEVER},
+    "no late re-acceptance": {"earth.patience_s": _NEVER},
+    "no hard iron": {"iron.worse": 2e-9, "iron.better": 1e-9},
+}
+
+
+def changed(params: Any, changes: dict[str, object]) -> Any:
+    """Return a params dataclass with the fields named by their path set to other values."""
+    for path, value in changes.items():
+        name, _, rest = path.partition(".")
+        params = replace(params, **{name: changed(getattr(params, name), {rest: value}) if rest else value})
+    return params
+
+
+def numbers(params: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the path and value of every number in a params dataclass."""
+    for each in fields(params):
+        value = getattr(params, each.name)
+        if is_dataclass(value):
+            yield from numbers(value, f"{path}{each.name}.")
+        elif isinstance(value, float):
+            yield path + each.name, value
+
+
+# Of the detection of rest only: dcm-adaptive learns the bias elsewhere.
+_UNUSED = {
+    "rest.bias_limit",
+    "rest.bias_std",
+    "rest.bias_walk",
+    "rest.rest_density",
+    "tilt.lost_s",
+    "heading.lost_density",
+}
+
+
+def parameters() -> dict[str, dict[str, object]]:
+    """Return each number at half and at double its default."""
+    variants: dict[str, dict[str, object]] = {"defaults": {}}
+    for path, value in numbers(AdaptiveParams()):
+        if path not in _UNUSED:
+            variants[f"{path} {value:.4g} / 2"] = {path: 0.5 * value}
+            variants[f"{path} {value:.4g} * 2"] = {path: 2.0 * value}
+    return variants
+
+
+def errors(trial: Trial, events: Sequence[FlatEvent], params: AdaptiveParams) -> Errors:
+    """Return the errors of the filter's orientation right after each gyroscope sample."""
+    adaptive = AdaptiveFilter(params)
+    times, quaternions, fed = [], [], 0
+    for row, event in enumerate(events):
+        if event[0] == _GYROSCOPE:
+            adaptive.update_batch(events[fed : row + 1])
+            fed = row + 1
+            answer = adaptive.orientation()
+            if answer is not None:
+                times.append(answer.timestamp_ns)
+                quaternions.append(answer.quaternion)
+    return score(trial, Track(np.array(times, np.int64), np.array(quaternions)))
+
+
+def main() -> int:
+    """Print the table."""
+    data = os.environ.get("POSED_DATA")
+    if data is None:
+        sys.exit("set POSED_DATA to the folder of recordings")
+    halve = sys.argv[1:] == ["parameters"]
+    variants = parameters() if halve else ABLATIONS
+    modes: tuple[ModeName, ...] = ("GAME", "NORMAL") if halve else MODES
+    made = {name: changed(AdaptiveParams(), changes) for name, changes in variants.items()}
+    folders = [Path(data) / name for name in ("broad", "smartphone-attitude")]
+    found: dict[tuple[str, str, ModeName], list[Errors]] = {}
+    for path in find_trials(folders):
+        trial = load_trial(path)
+        print(trial.name, file=sys.stderr, flush=True)
+        for mode in modes:
+            events = mode_events(trial, mode)
+            for name, params in made.items():
+                found.setdefault((name, trial.dataset, mode), []).append(errors(trial, events, params))
+    columns = [(dataset, mode) for dataset in dict.fromkeys(key[1] for key in found) for mode in modes]
+    print(f"{'':<52}" + "".join(f"{dataset[:5]:>7} {mode:<7}" for dataset, mode in columns))
+    reference = None
+    for name in made:
+        row = np.array(
+            [
+                [float(np.mean([getattr(e, part) for e in found[name, *column]])) for part in ("total", "inclination")]
+                for column in columns
+            ]
+        )
+        if reference is None:
+            reference = row
+            cells = [f"{total:8.2f}/{inclination:5.2f} " for total, inclination in row]
+        else:
+            cells = [f"{total:+8.2f}/{inclination:+5.2f} " for total, inclination in row - reference]
+        print(f"{name:<52}" + "".join(cells))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,85 @@
+cimport cython
+
+from posed.fusion.adaptive_bias cimport GyroBias
+from posed.fusion.adaptive_field cimport FieldGate
+from posed.fusion.adaptive_heading cimport Heading, HeadingState
+from posed.fusion.adaptive_interval cimport GyroInterval, IntervalState
+from posed.fusion.adaptive_iron cimport HardIron, IronState
+from posed.fusion.adaptive_state cimport AdaptiveState
+from posed.fusion.adaptive_tilt cimport Tilt, TiltState
+from posed.fusion.direction_cosines cimport DirectionCosines
+from posed.fusion.held cimport HeldEvents
+from posed.fusion.rest cimport RestBias, RestState
+from posed.fusion.three_state cimport ThreeState
+
+cdef extern from "math.h":
+    cpdef double sqrt(double x)
+    cpdef double atan2(double y, double x)
+
+cdef long long _ACCELEROMETER
+cdef long long _MAGNETIC_FIELD
+cdef long long _GYROSCOPE
+cdef long long _GAP
+cdef long long _BAD_SAMPLE
+cdef long long _MAX_STEP_NS
+cdef long long _MAX_LATE_NS
+cdef long long _MAX_TIME_NS
+cdef double _MAX_STEP_S
+cdef double _FIRST_STEP_S
+cdef Py_ssize_t _MAX_HELD
+cdef double _MIN_ACCELERATION2
+cdef double _MAX_MEASUREMENT2
+cdef double _MAX_RATE2
+cdef double _MIN_HORIZONTAL2
+
+@cython.final
+cdef class AdaptiveFilter:
+    cdef readonly str name
+    cdef readonly object params
+    cdef readonly AdaptiveState state
+    cdef bint _use_gyroscope
+    cdef bint _use_magnetometer
+    cdef double _gyro_delay_s
+    cdef long long _acc_late_ns
+    cdef long long _mag_late_ns
+    cdef double _tilt_time_s
+    cdef double _two_damping
+    cdef GyroInterval _interval
+    cdef Tilt _tilt
+    cdef RestBias _rest
+    cdef GyroBias _bias
+    cdef FieldGate _earth
+    cdef HardIron _iron
+    cdef Heading _heading
+
+    @cython.locals(sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double)
+    cpdef update_batch(self, events)
+
+    @cython.locals(s=AdaptiveState, held=HeldEvents, newest=cython.longlong, norm2=double)
+    cdef void _take(self, long long sensor_type, long long t, double x, double y, double z) noexcept
+    cdef void _see(self, long long t) noexcept
+    @cython.locals(s=AdaptiveState, step=cython.longlong, dt=double)
+    cdef void _take_rate(self, long long t, double x, double y, double z) noexcept
+    @cython.locals(
+        s=AdaptiveState, interval=GyroInterval, bias=ThreeState, held=HeldEvents, c=DirectionCosines,
+        count=Py_ssize_t, k=Py_ssize_t, time_ns=cython.longlong, at_ns=cython.longlong, u=double, length=double,
+    )
+    cdef void _close(self, double next_x, double next_y, double next_z, double dt) noexcept
+    @cython.locals(held=HeldEvents, count=Py_ssize_t, k=Py_ssize_t)
+    cdef void _lose_gyro(self) noexcept
+    @cython.locals(step=cython.longlong)
+    cdef void _measure_alone(self, long long sensor_type, long long t, double x, double y, double z) noexcept
+    cdef void _measure(self, long long sensor_type, long long t, double x, double y, double z, double u) noexcept
+    @cython.locals(
+        s=AdaptiveState, c=DirectionCosines, tilt=TiltState, rest=RestState, interval=GyroInterval, dt=double,
+        east_x=double, east_y=double, east_z=double, levelled=bint,
+    )
+    cdef void _measure_gravity(self, long long t, double x, double y, double z, double u) noexcept
+    @cython.locals(
+        s=AdaptiveState, c=DirectionCosines, interval=GyroInterval, interval_state=IntervalState, iron=IronState,
+        b=ThreeState, dt=double, weight=double,
+    )
+    cdef void _measure_north(self, long long t, double x, double y, double z, double u) noexcept
+    cdef void _restart(self, long long t) noexcept
+    cdef void _flag_gap(self) noexcept
+    cdef void _flag_bad_sample(self) noexcept
