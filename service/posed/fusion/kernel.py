@@ -3,7 +3,7 @@
 The build leaves a record beside the compiled files. With POSED_PURE set the sources are loaded in spite of them.
 """
 
-import hashlib
+import binascii
 import json
 import os
 import sys
@@ -31,10 +31,11 @@ def prepare() -> None:
     if os.environ.get("POSED_PURE"):
         sys.meta_path.insert(0, _Sources())
         return
-    digests: dict[str, str] = json.loads(_RECORD.read_text())["sha256"] if _RECORD.exists() else {}
-    for name in sorted(digests.keys() | {f"{module}.py" for module in compiled}):
+    # A checksum does against mistakes, and hashlib would load OpenSSL into the daemon.
+    checksums: dict[str, int] = json.loads(_RECORD.read_text())["crc32"] if _RECORD.exists() else {}
+    for name in sorted(checksums.keys() | {f"{module}.py" for module in compiled}):
         source = _FOLDER / name
-        if not source.exists() or hashlib.sha256(source.read_bytes()).hexdigest() != digests.get(name):
+        if not source.exists() or binascii.crc32(source.read_bytes()) != checksums.get(name):
             raise StaleKernelError(
                 f"{source} is not what the compiled filters were made from; install posed again"
                 " (in a source tree: pip install -e .), or set POSED_PURE=1 to run the source interpreted"
