@@ -28,6 +28,7 @@ from simulation import Simulation, axes, simulate
 
 import posed.ar.app
 from posed.events import Float64Array, Int64Array, RateMode
+from posed.fusion import DEFAULT_FILTER
 from posed.fusion.filter import OrientationFilter
 from posed.hal.profile import load_profile
 from posed.sensors import make_device_filter
@@ -178,7 +179,7 @@ def _figures(name: str, errors: Float64Array, unit: str, at_most: float | None =
 
 
 def _filter() -> OrientationFilter:
-    return make_device_filter("dcm", load_profile("patonis2018"))
+    return make_device_filter(DEFAULT_FILTER, load_profile("patonis2018"))
 
 
 if __name__ == "__main__":

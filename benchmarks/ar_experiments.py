@@ -31,6 +31,7 @@ from simulation import Simulation, axes, raw_axes, simulate
 
 from posed.evaluation.measures import to_magnetic_north
 from posed.events import Float64Array, Int64Array, RateMode
+from posed.fusion import DEFAULT_FILTER
 from posed.fusion.filter import OrientationFilter
 from posed.hal.motion import MotionScript, make_script
 from posed.hal.profile import load_profile
@@ -214,7 +215,7 @@ def plot_axes(path: Path) -> None:
 
 
 def _filter() -> OrientationFilter:
-    return make_device_filter("dcm", load_profile("patonis2018"))
+    return make_device_filter(DEFAULT_FILTER, load_profile("patonis2018"))
 
 
 Axes = tuple[Float64Array, Float64Array, Float64Array]

@@ -130,6 +130,7 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
     from posed.daemon.statistics import PublicationStatistics
     from posed.daemon.waiting import Waiter
     from posed.events import SensorType
+    from posed.fusion import DEFAULT_FILTER
     from posed.hal import open_source
     from posed.hal.profile import load_profile
     from posed.sensors import SensorService, make_device_filter
@@ -137,7 +138,7 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
     clock = BootClock()
     profile = load_profile("patonis2018")
     source = open_source(f"replay:{recording}", profile, clock, loop=True)
-    service = SensorService(source, make_device_filter("dcm", profile), clock)
+    service = SensorService(source, make_device_filter(DEFAULT_FILTER, profile), clock)
     statistics = PublicationStatistics()
     publisher = PosePublisher(pose_path(directory), context(), bytes(16), clock, source, statistics)
     service.register_pose("loop", 100_000, 0)

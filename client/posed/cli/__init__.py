@@ -91,7 +91,9 @@ def _parser() -> argparse.ArgumentParser:
 
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        print(f"posed {__version__}")
+        from posed.fusion.kernel import kernel
+
+        print(f"posed {__version__}, filters {kernel()}")
         parser.exit()
 
 

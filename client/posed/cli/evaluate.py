@@ -18,10 +18,10 @@ from posed.evaluation.evaluate import PHONE, Evaluation, Plan, evaluate
 from posed.evaluation.rates import MODES, ModeName
 from posed.evaluation.report import NOTES, ReportTable, as_json, as_markdown, tables
 from posed.evaluation.trials import find_trials
-from posed.fusion import FILTERS, PACKAGED
+from posed.fusion import DEFAULT_FILTER, FILTERS, PACKAGED
 
 EX_DATAERR = 65
-DEFAULT_FILTERS = tuple(name for name in ("dcm-adaptive", "dcm") if name in FILTERS)
+_DEFAULT_FILTERS = (DEFAULT_FILTER, "dcm")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--filters",
         type=_names,
-        default=DEFAULT_FILTERS,
+        default=_DEFAULT_FILTERS,
         metavar="A,B",
-        help=f"of {', '.join((*sorted(FILTERS), *PACKAGED, PHONE))} (default: {','.join(DEFAULT_FILTERS)})",
+        help=f"of {', '.join((*sorted(FILTERS), *PACKAGED, PHONE))} (default: {','.join(_DEFAULT_FILTERS)})",
     )
     parser.add_argument(
         "--modes", type=_modes, default=MODES, metavar="A,B", help=f"rate modes (default: {','.join(MODES)})"

@@ -15,6 +15,7 @@ from posed.cli.options import add_aligned_option, add_pose_rate_option, add_prof
 from posed.errors import InvalidArgumentError
 from posed.evaluation.fuse import fuse_recording
 from posed.events import Pose, RateMode
+from posed.fusion import DEFAULT_FILTER
 from posed.hal.profile import load_profile
 from posed.hal.replay import load_recording
 
@@ -30,9 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--filter",
         type=_filters,
-        default=("dcm",),
+        default=(DEFAULT_FILTER,),
         metavar="NAME,NAME",
-        help="orientation filters, one or several side by side (default: dcm)",
+        help=f"orientation filters, one or several side by side (default: {DEFAULT_FILTER})",
     )
     add_profile_option(parser, "patonis2018")
     add_pose_rate_option(parser)

@@ -49,7 +49,7 @@ def add_profile_option(parser: "argparse._ActionsContainer", default: str = argp
 
 def add_filter_option(parser: "argparse._ActionsContainer", default: str = argparse.SUPPRESS) -> None:
     """Add --filter."""
-    parser.add_argument("--filter", default=default, metavar="NAME", help="orientation filter (default: dcm)")
+    parser.add_argument("--filter", default=default, metavar="NAME", help="orientation filter (default: dcm-adaptive)")
 
 
 def add_aligned_option(parser: "argparse._ActionsContainer") -> None:

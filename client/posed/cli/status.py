@@ -23,10 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 Exit codes: 0 it runs; 3 it does not; 69 it does not answer. Asking does not count as a binding.
 
 Keys of --json: running (the only one if false), pid, version, boot_id, uptime_s, started, bound_clients, connections,
-source, source_ended, profile, filter, runtime_directory, process_cpu_s, wakeups, events_fused, poses_published,
-poses_skipped, lateness_p50_ms, lateness_p99_ms, parcels_refused, sensors (handle, type, name, requested_hz,
-configured_hz, latency_ms, registrations, events), listeners (pid, package, listener, events_received, events_sent,
-events_dropped, events_cached)."""
+source, source_ended, profile, filter, filters_compiled, runtime_directory, process_cpu_s, wakeups, events_fused,
+poses_published, poses_skipped, lateness_p50_ms, lateness_p99_ms, parcels_refused, sensors (handle, type, name,
+requested_hz, configured_hz, latency_ms, registrations, events), listeners (pid, package, listener, events_received,
+events_sent, events_dropped, events_cached)."""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -66,6 +66,7 @@ def _facts(
         "source_ended": statistics.source_ended,
         "profile": status.profile,
         "filter": status.filter,
+        "filters_compiled": statistics.filters_compiled,
         "runtime_directory": str(runtime_directory()),
         "process_cpu_s": statistics.process_cpu_ns / 1e9,
         "wakeups": statistics.wakeups,
@@ -114,7 +115,7 @@ def _print(facts: dict[str, Any]) -> None:
         "life": f"{stays}; {_count(facts['bound_clients'], 'bound client')}, "
         f"{_count(facts['connections'], 'connection')}",
         "source": f"{facts['source']}{' (at its end)' if facts['source_ended'] else ''}, profile {facts['profile']},"
-        f" filter {facts['filter']}",
+        f" filter {facts['filter']} ({'compiled' if facts['filters_compiled'] else 'interpreted'})",
         "poses": f"{facts['poses_published']} published, {facts['poses_skipped']} skipped as late",
         "lateness": f"median {facts['lateness_p50_ms']:.2f} ms, 99 % within {facts['lateness_p99_ms']:.2f} ms"
         if facts["poses_published"]

@@ -107,7 +107,7 @@ class DumpReply(_message.Message):
     def __init__(self, text: _Optional[str] = ..., more: bool = ...) -> None: ...
 
 class Statistics(_message.Message):
-    __slots__ = ("timestamp_ns", "process_cpu_ns", "source_cpu_ns", "filter_cpu_ns", "wakeups", "events_fused", "poses_published", "poses_skipped", "lateness_p50_ms", "lateness_p99_ms", "sensors", "listeners", "parcels_refused", "source_ended")
+    __slots__ = ("timestamp_ns", "process_cpu_ns", "source_cpu_ns", "filter_cpu_ns", "wakeups", "events_fused", "poses_published", "poses_skipped", "lateness_p50_ms", "lateness_p99_ms", "sensors", "listeners", "parcels_refused", "source_ended", "filters_compiled")
     TIMESTAMP_NS_FIELD_NUMBER: _ClassVar[int]
     PROCESS_CPU_NS_FIELD_NUMBER: _ClassVar[int]
     SOURCE_CPU_NS_FIELD_NUMBER: _ClassVar[int]
@@ -122,6 +122,7 @@ class Statistics(_message.Message):
     LISTENERS_FIELD_NUMBER: _ClassVar[int]
     PARCELS_REFUSED_FIELD_NUMBER: _ClassVar[int]
     SOURCE_ENDED_FIELD_NUMBER: _ClassVar[int]
+    FILTERS_COMPILED_FIELD_NUMBER: _ClassVar[int]
     timestamp_ns: int
     process_cpu_ns: int
     source_cpu_ns: int
@@ -136,7 +137,8 @@ class Statistics(_message.Message):
     listeners: _containers.RepeatedCompositeFieldContainer[ListenerStatistics]
     parcels_refused: int
     source_ended: bool
-    def __init__(self, timestamp_ns: _Optional[int] = ..., process_cpu_ns: _Optional[int] = ..., source_cpu_ns: _Optional[int] = ..., filter_cpu_ns: _Optional[int] = ..., wakeups: _Optional[int] = ..., events_fused: _Optional[int] = ..., poses_published: _Optional[int] = ..., poses_skipped: _Optional[int] = ..., lateness_p50_ms: _Optional[float] = ..., lateness_p99_ms: _Optional[float] = ..., sensors: _Optional[_Iterable[_Union[SensorStatistics, _Mapping]]] = ..., listeners: _Optional[_Iterable[_Union[ListenerStatistics, _Mapping]]] = ..., parcels_refused: _Optional[int] = ..., source_ended: bool = ...) -> None: ...
+    filters_compiled: bool
+    def __init__(self, timestamp_ns: _Optional[int] = ..., process_cpu_ns: _Optional[int] = ..., source_cpu_ns: _Optional[int] = ..., filter_cpu_ns: _Optional[int] = ..., wakeups: _Optional[int] = ..., events_fused: _Optional[int] = ..., poses_published: _Optional[int] = ..., poses_skipped: _Optional[int] = ..., lateness_p50_ms: _Optional[float] = ..., lateness_p99_ms: _Optional[float] = ..., sensors: _Optional[_Iterable[_Union[SensorStatistics, _Mapping]]] = ..., listeners: _Optional[_Iterable[_Union[ListenerStatistics, _Mapping]]] = ..., parcels_refused: _Optional[int] = ..., source_ended: bool = ..., filters_compiled: bool = ...) -> None: ...
 
 class SensorStatistics(_message.Message):
     __slots__ = ("handle", "requested_period_us", "configured_period_ns", "max_report_latency_us", "registrations", "events")

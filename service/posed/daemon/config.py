@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from posed.events import Position
+from posed.fusion import DEFAULT_FILTER
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +14,7 @@ class DaemonConfig:
     """`sim[:SCRIPT]` or `replay:PATH`."""
     profile: str = "patonis2018"
     """A shipped device profile's name or a path to a TOML file."""
-    filter: str = "dcm"
+    filter: str = DEFAULT_FILTER
     seed: int = 0
     """Of the simulated phone's noise and errors."""
     speed: float = 1.0

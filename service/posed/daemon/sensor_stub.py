@@ -12,6 +12,7 @@ from posed.daemon.clients import ClientRegistry
 from posed.daemon.listeners import Listeners
 from posed.daemon.statistics import PublicationStatistics, process_cpu_ns, voluntary_switches
 from posed.errors import InvalidArgumentError, InvalidStateError
+from posed.fusion.kernel import kernel
 from posed.proto import binder_pb2, events_pb2, sensors_pb2
 from posed.sensors import SensorService
 from posed.sensors.dump import Traffic, dump
@@ -166,6 +167,7 @@ class SensorServiceStub(Stub):
             ],
             parcels_refused=self._parcels_refused(),
             source_ended=self._service.ended,
+            filters_compiled=kernel() == "compiled",
         )
 
     # Private

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from posed.clock import VirtualClock
 from posed.events import Pose
+from posed.fusion import DEFAULT_FILTER
 from posed.hal.profile import DeviceProfile
 from posed.hal.recording import Recording
 from posed.hal.replay import ReplaySource
@@ -15,7 +16,7 @@ def fuse_recording(
     profile: DeviceProfile,
     *,
     sampling_period_us: int,
-    filter_name: str = "dcm",
+    filter_name: str = DEFAULT_FILTER,
     pose_period_us: int = 100_000,
     aligned: bool = False,
     step_ns: int = 1_000_000_000,

@@ -46,6 +46,8 @@ def _geomag(noise: SensorNoise) -> OrientationFilter:
     return AdaptiveFilter(AdaptiveParams(use_gyroscope=False), name="geomag")
 
 
+DEFAULT_FILTER = "dcm-adaptive"
+
 FILTERS: Mapping[str, Callable[[SensorNoise], OrientationFilter]] = {
     "dcm": _dcm,
     "dcm-adaptive": _adaptive,
