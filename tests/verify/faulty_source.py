@@ -12,8 +12,8 @@ from posed.client import Sensor, SensorEvent, TriggerEvent
 
 MIN_DELAY_US, MAX_DELAY_US = 5_000, 200_000
 START_NS = 1_000_000_000_000
-# Registrations, counted from 1: twelve come before those of churn, and those of moving rates behind.
-_OF_CHURN = range(40, 64)
+# Registrations, counted from 1: thirteen come before those of churn, and those of moving rates behind.
+_OF_CHURN = range(40, 65)
 
 
 class Fault(Enum):
@@ -35,6 +35,8 @@ class Fault(Enum):
     WRONG_UNIT = auto()
     NOISY = auto()
     BATCH_WITHHELD = auto()
+    FIFO_HALVED = auto()
+    MISCALIBRATED = auto()
     REGISTERS_TWICE = auto()
     TRIGGERS_ANYTHING = auto()
     FLUSH_LOST = auto()
@@ -218,6 +220,9 @@ class FaultySource:
             self._last_event = event
             if registration.latency_us:
                 registration.batch.append(event)
+                fifo = sensor.fifo_max_event_count // (2 if self._fault is Fault.FIFO_HALVED else 1)
+                if len(registration.batch) >= fifo:
+                    self._hand(registration, registration.batch)
             elif self._fault is Fault.LATE and now_ns - registration.begun_ns > 3_000_000_000:
                 self._clock.at(now_ns + 800_000_000, lambda r=registration, e=event: self._hand(r, [e]))
             else:
@@ -225,7 +230,7 @@ class FaultySource:
 
     def _event(self, registration: _Registration, sensor: Sensor, time_ns: int, period_ns: int) -> SensorEvent | None:
         n = registration.samples
-        values = (0.0, 0.0, 9.81)
+        values: tuple[float, ...] = (0.0, 0.0, 9.81)
         match self._fault:
             case Fault.GAPPY if n % 44 == 8:
                 return None
@@ -247,6 +252,12 @@ class FaultySource:
                 values = (0.0, 0.0, 1.0)
             case Fault.NOISY:
                 values = (self._rng.gauss(0, 1.4), 0.0, 9.81)
+            case Fault.MISCALIBRATED if sensor.type == Sensor.TYPE_GYROSCOPE:
+                values = (0.0, 0.02, 0.01)
+            case _ if sensor.type == Sensor.TYPE_GYROSCOPE:
+                values = (0.0, 0.0, 0.01)
+            case _ if sensor.type == Sensor.TYPE_GYROSCOPE_UNCALIBRATED:
+                values = (0.1, 0.2, 0.31, 0.1, 0.2, 0.3)
         return SensorEvent(sensor, time_ns, values, 3)
 
     def _batch_later(self, registration: _Registration) -> None:

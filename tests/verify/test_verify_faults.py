@@ -32,6 +32,7 @@ _OF_EVENTS = {
 _OF_BATCHES = {Fault.BATCH_WITHHELD: {"BatchArrival", "EventBasic", "EventTimestampSynchronization"}}
 _OF_CALLS = {
     Fault.REGISTERS_TWICE: {"RegisterTwice"},
+    Fault.FIFO_HALVED: {"FifoLength"},
     Fault.TRIGGERS_ANYTHING: {"Trigger"},
     Fault.FLUSH_LOST: {"Flush"},
     Fault.FLUSH_TOLD_TO_ALL: {"Flush"},
@@ -98,9 +99,18 @@ def test_a_one_shot_sensor_is_waited_for_once(fault: Fault, failed: set[str]) ->
 
 
 def test_every_fault_is_tried() -> None:
-    elsewhere = {Fault.NONE, Fault.CANCELS_TWICE, Fault.FIVE_TIMES_TOO_FAST}
+    elsewhere = {Fault.NONE, Fault.CANCELS_TWICE, Fault.MISCALIBRATED, Fault.FIVE_TIMES_TOO_FAST}
     tried = {*_OF_EVENTS, *_OF_BATCHES, *_OF_CALLS, *elsewhere}
     assert tried == set(Fault)
+
+
+@pytest.mark.parametrize(("fault", "failed"), [(Fault.NONE, set()), (Fault.MISCALIBRATED, {"CalibratedUncalibrated"})])
+def test_a_gyroscope_is_its_uncalibrated_stream_without_the_bias(fault: Fault, failed: set[str]) -> None:
+    clock = VirtualClock()
+    sensors = (a_sensor(Sensor.TYPE_GYROSCOPE), a_sensor(Sensor.TYPE_GYROSCOPE_UNCALIBRATED))
+    findings = run_point(FaultySource(clock, fault, sensors), clock, Point(sensors, 10_000, 0), _CONDITIONS)
+    assert "CalibratedUncalibrated" in {finding.verification for finding in findings}
+    assert _failed(findings) == failed
 
 
 def test_the_profiles_own_rate_binds_where_androids_band_has_none_and_the_report_says_so() -> None:

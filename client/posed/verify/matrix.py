@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from posed.client.sensor import Sensor
+from posed.verify.calibration import UNCALIBRATED, verify_calibration
 from posed.verify.collector import Collector
 from posed.verify.delivery import verify_delivery
 from posed.verify.finding import Finding, judged
@@ -66,10 +67,12 @@ def points(sensors: Sequence[Sensor], rates_hz: Sequence[float] = RATES_HZ) -> l
 
 
 def run_point(source: EventSource, clock: SuiteClock, point: Point, conditions: Conditions) -> list[Finding]:
-    """Record the sensors of a point side by side and judge each."""
-    return [
-        finding for recording in record(source, clock, point, conditions) for finding in judge(recording, conditions)
-    ]
+    """Record the sensors of a point side by side and judge each, and each beside its uncalibrated stream."""
+    recordings = record(source, clock, point, conditions)
+    findings = [finding for recording in recordings for finding in judge(recording, conditions)]
+    of_type = {recording.sensor.type: recording for recording in recordings}
+    pairs = [(of_type.get(kind), of_type.get(raw)) for kind, raw in UNCALIBRATED.items()]
+    return findings + [verify_calibration(one, other) for one, other in pairs if one and other]
 
 
 def record(source: EventSource, clock: SuiteClock, point: Point, conditions: Conditions) -> list[Recording]:
