@@ -22,7 +22,11 @@ def test_the_daemon_is_what_android_asks_for(desk: Any, tmp_path: Path, profile:
     failed = [(case.get("classname"), case.get("name")) for case in cases if case.find("failure") is not None]
     assert [each for each in failed if each[0] not in _OF_LATENESS] == []
     assert ended.returncode == bool(failed), ended.stderr
-    assert f"{len(cases) - len(failed)} passed, {len(failed)} failed, 0 skipped" in ended.stdout
+    # A FIFO that takes minutes to fill is not tried.
+    skipped = sum(case.find("skipped") is not None for case in cases)
+    assert skipped == (2 if profile == "modern" else 0)
+    passed = len(cases) - len(failed) - skipped
+    assert f"{passed} passed, {len(failed)} failed, {skipped} skipped" in ended.stdout
     assert {"Frequency", "EventOrdering", "StandardDeviation", "Flush", "Churn", "MovingRates"} <= {
         case.get("classname") for case in cases
     }
