@@ -6,13 +6,16 @@ from collections.abc import Callable, Iterator
 
 from posed.client.sensor import Sensor
 from posed.verify.collector import Collector
-from posed.verify.finding import Finding, judged
+from posed.verify.fifo import verify_fifo_length
+from posed.verify.finding import Finding, judged, skipped
+from posed.verify.recording import Recording
 from posed.verify.source import EventSource, SuiteClock
 
 _EVENT_S = 5.0
 _FLUSH_S = 10.0
 _CHURNS = 50
 _MOVES = 100
+_LONGEST_FIFO_S = 10.0
 _FLUSHES = 5
 _STALE_NS = 500_000_000
 _CLIENT_PERIODS_US = (0, 20_000, 66_667, 200_000)
@@ -37,6 +40,7 @@ class Behaviour:
         return {
             **always,
             "FlushInactive": self.flush_inactive,
+            **({"FifoLength": self.fifo_length} if self._sensor.fifo_max_event_count else {}),
             "NoStaleEvents": self.no_stale_events,
             "MultiClient": self.multi_client,
             "Churn": self.churn,
@@ -104,6 +108,24 @@ class Behaviour:
             f"{accepted}, {len(listener.flushed)} completed",
             "False, 0",
             not accepted and not listener.flushed,
+        )
+
+    def fifo_length(self) -> Iterator[Finding]:
+        """A FIFO holds what it is said to hold (BatchAndFlush of CTS Verifier)."""
+        seconds = self._sensor.fifo_max_event_count * self._sensor.min_delay / 1e6
+        if seconds > _LONGEST_FIFO_S:
+            yield skipped("FifoLength", self._subject, f"to fill the FIFO would take longer than {_LONGEST_FIFO_S:g} s")
+            return
+        listener = self._listener()
+        begun_ns = self._clock.now_ns()
+        latency_us = round(4e6 * seconds)
+        self._register(listener, 0, latency_us)
+        # Twice its length: the first filling can be cut short by what was there before.
+        self._clock.wait(2.5 * seconds + 0.5)
+        self._source.unregister_listener(listener)
+        received = tuple(listener.received)
+        yield verify_fifo_length(
+            Recording(self._subject, self._sensor, 0, latency_us, begun_ns, self._clock.now_ns(), received)
         )
 
     def no_stale_events(self) -> Iterator[Finding]:

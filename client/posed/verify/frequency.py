@@ -1,17 +1,20 @@
 """FrequencyVerification: events come at the rate that was asked."""
 
 from posed.verify.finding import Finding, judged, skipped
-from posed.verify.recording import Recording
+from posed.verify.recording import Recording, is_fused
 
 NAME = "Frequency"
 _LOWER, _UPPER = 0.90, 2.20
 # A part that has few rates answers with one of them: as near to it as Android wants a rate outside the range.
 _UPPER_OF_PROFILE = 1.10
+# Fused sensors follow the accelerometer, of which they never ask less (SensorFusion::setDelay).
+_FUSED_HZ = 20.0
 
 
 def verify_frequency(recording: Recording) -> Finding:
     """Judge f = (n - 1) / (last - first): 0.90 of the rate asked < f < 2.20 of it, both within the sensor's range.
 
+    A fused sensor may run at 2.20 times the 20 Hz that are asked of the accelerometer for it, whatever was asked of it.
     Where the sensor's slowest rate that is not slower than the request lies above 2.20 of it, that rate's own 1.10 is
     the upper bound, and the note says so. CTS skips a sensor that another client overloads.
     """
@@ -24,6 +27,8 @@ def verify_frequency(recording: Recording) -> Finding:
     lower = _LOWER * 1e6 / recording.shortest_expected_us
     upper = _UPPER * 1e6 / recording.expected_us
     note = ""
+    if is_fused(recording.sensor):
+        upper = max(upper, _UPPER * _FUSED_HZ)
     own = _rate_of_profile(recording)
     if own is not None and own > upper / _UPPER_OF_PROFILE:
         upper = own * _UPPER_OF_PROFILE
@@ -38,6 +43,8 @@ def _rate_of_profile(recording: Recording) -> float | None:
     if not recording.rates_hz:
         return None
     asked = 1e6 / recording.expected_us
+    if is_fused(recording.sensor):
+        asked = max(asked, _FUSED_HZ)
     # Delays are whole microseconds: 15 Hz is asked back as 66667 us.
     serving = [rate for rate in recording.rates_hz if rate >= asked * (1 - 1e-4)]
     return min(serving) if serving else max(recording.rates_hz)

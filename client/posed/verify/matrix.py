@@ -4,12 +4,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from posed.client.sensor import Sensor
+from posed.verify.calibration import UNCALIBRATED, verify_calibration
 from posed.verify.collector import Collector
 from posed.verify.delivery import verify_delivery
 from posed.verify.finding import Finding, judged
 from posed.verify.frequency import verify_frequency
 from posed.verify.ordering import verify_ordering
-from posed.verify.recording import Recording
+from posed.verify.recording import Recording, is_fused
 from posed.verify.source import EventSource, SuiteClock
 from posed.verify.spacing import verify_gaps, verify_jitter
 from posed.verify.synchronization import verify_clock_source, verify_synchronization
@@ -18,19 +19,6 @@ from posed.verify.values import verify_magnitude, verify_standard_deviation
 RATES_HZ = (0.0, 200.0, 100.0, 50.0, 25.0, 15.0, 10.0, 5.0, 1.0)
 """Those of CTS; 0 is fastest."""
 BATCH_LATENCY_US = 1_000_000
-_FUSED = frozenset(
-    (
-        Sensor.TYPE_ORIENTATION,
-        Sensor.TYPE_GRAVITY,
-        Sensor.TYPE_LINEAR_ACCELERATION,
-        Sensor.TYPE_ROTATION_VECTOR,
-        Sensor.TYPE_GAME_ROTATION_VECTOR,
-        Sensor.TYPE_GEOMAGNETIC_ROTATION_VECTOR,
-        Sensor.TYPE_POSE_6DOF,
-        Sensor.TYPE_HEADING,
-    )
-)
-"""Their service may ask the phone's own sensors for more on their behalf, so that those are not judged beside them."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +26,8 @@ class Conditions:
     """What the matrix is run under.
 
     seconds: length of a point. still: the phone is at rest, so its noise may be judged. hifi: judge as a Hi-Fi device.
-    rates_hz_of: the rates that a sensor has, () if unknown. asked_by_others_us: the fastest period asked of a sensor by
-    all clients, None if unknown.
+    rates_hz_of: the rates that a sensor has, the accelerometer's for a fused one, () if unknown. fastest_asked_us: the
+    shortest period that any client asks of a sensor, the suite included, None if unknown.
     """
 
     seconds: float = 5.0
@@ -60,14 +48,15 @@ class Point:
     @property
     def name(self) -> str:
         """Rate and mode, for people."""
-        rate = f"{1e6 / self.sampling_period_us:g} Hz" if self.sampling_period_us else "fastest"
+        rate = f"{1e6 / self.sampling_period_us:.4g} Hz" if self.sampling_period_us else "fastest"
         return f"{rate} {'batched' if self.max_report_latency_us else 'streaming'}"
 
 
 def points(sensors: Sequence[Sensor], rates_hz: Sequence[float] = RATES_HZ) -> list[Point]:
     """Return the points of the matrix: continuous sensors only, the phone's own apart from the fused."""
     continuous = [s for s in sensors if s.reporting_mode == Sensor.REPORTING_MODE_CONTINUOUS]
-    groups = [[s for s in continuous if s.type not in _FUSED], [s for s in continuous if s.type in _FUSED]]
+    # A fused sensor may ask the phone's own for more, so that these cannot be judged beside it.
+    groups = [[s for s in continuous if not is_fused(s)], [s for s in continuous if is_fused(s)]]
     return [
         Point(tuple(group), round(1e6 / rate) if rate else 0, latency_us)
         for rate in rates_hz
@@ -78,10 +67,12 @@ def points(sensors: Sequence[Sensor], rates_hz: Sequence[float] = RATES_HZ) -> l
 
 
 def run_point(source: EventSource, clock: SuiteClock, point: Point, conditions: Conditions) -> list[Finding]:
-    """Record the sensors of a point side by side and judge each."""
-    return [
-        finding for recording in record(source, clock, point, conditions) for finding in judge(recording, conditions)
-    ]
+    """Record the sensors of a point side by side and judge each, and each beside its uncalibrated stream."""
+    recordings = record(source, clock, point, conditions)
+    findings = [finding for recording in recordings for finding in judge(recording, conditions)]
+    of_type = {recording.sensor.type: recording for recording in recordings}
+    pairs = [(of_type.get(kind), of_type.get(raw)) for kind, raw in UNCALIBRATED.items()]
+    return findings + [verify_calibration(one, other) for one, other in pairs if one and other]
 
 
 def record(source: EventSource, clock: SuiteClock, point: Point, conditions: Conditions) -> list[Recording]:

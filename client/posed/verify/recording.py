@@ -7,6 +7,23 @@ from itertools import pairwise
 from posed.client.sensor import Sensor, SensorEvent
 
 _MINIMUM_PERIOD_US = 1_000
+_FUSED = frozenset(
+    (
+        Sensor.TYPE_ORIENTATION,
+        Sensor.TYPE_GRAVITY,
+        Sensor.TYPE_LINEAR_ACCELERATION,
+        Sensor.TYPE_ROTATION_VECTOR,
+        Sensor.TYPE_GAME_ROTATION_VECTOR,
+        Sensor.TYPE_GEOMAGNETIC_ROTATION_VECTOR,
+        Sensor.TYPE_POSE_6DOF,
+        Sensor.TYPE_HEADING,
+    )
+)
+
+
+def is_fused(sensor: Sensor) -> bool:
+    """Return whether a sensor is computed from others, so that it may hurry them and follows the accelerometer."""
+    return sensor.type in _FUSED
 
 
 @dataclass(frozen=True, slots=True)
