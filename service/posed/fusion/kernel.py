@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
-from importlib.util import spec_from_file_location
+from importlib.util import find_spec, spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 
@@ -44,9 +44,8 @@ def prepare() -> None:
 
 def kernel() -> str:
     """Return how the filters of this process run: "compiled" or "interpreted"."""
-    from posed.fusion import dcm
-
-    return "compiled" if str(dcm.__file__).endswith(EXTENSION_SUFFIXES[0]) else "interpreted"
+    found = find_spec(f"{_PACKAGE}.dcm")
+    return "compiled" if found is not None and str(found.origin).endswith(EXTENSION_SUFFIXES[0]) else "interpreted"
 
 
 class _Sources:

@@ -4,8 +4,6 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 
 from posed.errors import InvalidArgumentError
-from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
-from posed.fusion.dcm import DcmFilter, DcmParams
 from posed.fusion.filter import OrientationFilter, SensorNoise
 
 
@@ -29,20 +27,29 @@ def _packaged(name: str) -> Callable[[SensorNoise], OrientationFilter] | None:
     return maker
 
 
+# Each imports its filter when it is wanted: the compiled code of those that are not would stay in the daemon's memory.
 def _dcm(noise: SensorNoise) -> OrientationFilter:
+    from posed.fusion.dcm import DcmFilter, DcmParams
+
     return DcmFilter(DcmParams(noise=noise))
 
 
 def _adaptive(noise: SensorNoise) -> OrientationFilter:
     """The noise of the parts is far below what this filter reckons with, so it is not asked for."""
+    from posed.fusion.adaptive import AdaptiveFilter
+
     return AdaptiveFilter()
 
 
 def _game(noise: SensorNoise) -> OrientationFilter:
+    from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
+
     return AdaptiveFilter(AdaptiveParams(use_magnetometer=False), name="game")
 
 
 def _geomag(noise: SensorNoise) -> OrientationFilter:
+    from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
+
     return AdaptiveFilter(AdaptiveParams(use_gyroscope=False), name="geomag")
 
 

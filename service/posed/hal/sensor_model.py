@@ -1,7 +1,6 @@
 """What one part of a simulated phone reports: the physics of its motion, then the part's own errors."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 from math import cos, radians, sin
 
 import numpy as np
@@ -10,7 +9,7 @@ from posed.events import STANDARD_GRAVITY, Float64Array, Int64Array, SensorType
 from posed.hal import rotation
 from posed.hal.calibration import Calibration
 from posed.hal.motion import MotionScript
-from posed.hal.profile import SensorProfile, exact_period_ns
+from posed.hal.profile import ExactPeriod, SensorProfile, exact_period_ns
 from posed.hal.seeded import SeededRandom
 
 BLOCK_SAMPLES = 256
@@ -80,7 +79,7 @@ class SensorModel:
         reading = truth @ self._errors.T + self._bias + self._walk.at(t[1:])
         reading += noise[:, :3] * (self._part.noise_density * rate_hz**0.5)
         # Kept within a third of the period, so that timestamps ascend whatever is drawn.
-        latest = min(3e9 * self._part.timestamp_jitter_s, float(period) / 3.0)
+        latest = min(3e9 * self._part.timestamp_jitter_s, (period.numerator / period.denominator) / 3.0)
         jitter = np.clip(noise[:, 3] * (1e9 * self._part.timestamp_jitter_s), -latest, latest)
         return grid_ns[1:] + np.rint(jitter).astype(np.int64), self._digitised(self._calibration.invert(reading))
 
@@ -107,7 +106,7 @@ _ERROR_STREAM = 2
 """Sets the generators of errors apart from that of the motion made from the same seed."""
 
 
-def _grid_ns(period: Fraction, index: int) -> Int64Array:
+def _grid_ns(period: ExactPeriod, index: int) -> Int64Array:
     """Return the instants (ns) of a block on the exact grid, the one before it in front: int64[BLOCK_SAMPLES + 1]."""
     # The block's start in Python's integers: the product leaves 64 bits behind after days of an uneven rate.
     whole, rest = divmod(index * BLOCK_SAMPLES * period.numerator, period.denominator)

@@ -155,7 +155,7 @@ class _Stream:
         self.after_ns = after_ns
         # Jitter keeps a sample within a third of a period of its instant: none before the last instant passed is later
         # than after_ns.
-        passed = int((after_ns - zero_ns) / exact_period_ns(rate_hz))
+        passed = exact_period_ns(rate_hz).samples_in(after_ns - zero_ns)
         self._load(max(passed - 1, 0) // BLOCK_SAMPLES)
         self._seek(bisect_right(self._stamps, after_ns))
         if since_ns is not None:
@@ -184,7 +184,7 @@ class _Stream:
 
     def _instant_ns(self, samples: int) -> int:
         """Return where the last of the first `samples` samples of the block stands on the grid, free of jitter."""
-        return self._zero_ns + int((self._index * BLOCK_SAMPLES + samples) * exact_period_ns(self._rate_hz))
+        return self._zero_ns + exact_period_ns(self._rate_hz).until(self._index * BLOCK_SAMPLES + samples)
 
     def _seek(self, offset: int) -> None:
         if offset == BLOCK_SAMPLES:
