@@ -36,6 +36,7 @@ _DIRECTIVES = {
     "language_level": 3,
     "annotation_typing": False,
     "auto_pickle": False,
+    "binding": False,
     "boundscheck": False,
     "wraparound": False,
     "initializedcheck": False,
@@ -44,6 +45,9 @@ _DIRECTIVES = {
 # Same bits as the interpreter: nothing reassociated, no product and sum contracted into one rounding, no sin and cos
 # merged into a sincos that might round otherwise.
 _C_FLAGS = ["-O2", "-g0", "-w", "-fno-fast-math", "-ffp-contract=off", "-fno-builtin-sin", "-fno-builtin-cos"]
+
+# Each compiled module is mapped into the daemon: nothing in it that is not needed, and no page begun for a few bytes.
+_LINK_FLAGS = ["-Wl,-z,noseparate-code", "-Wl,--gc-sections", "-s"]
 
 
 class KernelBuildHook(BuildHookInterface):  # type: ignore[type-arg]
@@ -91,7 +95,12 @@ def build(root: Path, objects: Path, target: Path, *, force: bool) -> str | None
         return str(error)
     with contextlib.chdir(root):
         extensions = [
-            Extension(f"{PACKAGE}.{name}", [str(_FOLDER / f"{name}.py")], extra_compile_args=_C_FLAGS)
+            Extension(
+                f"{PACKAGE}.{name}",
+                [str(_FOLDER / f"{name}.py")],
+                extra_compile_args=_C_FLAGS,
+                extra_link_args=_LINK_FLAGS,
+            )
             for name in MODULES
         ]
         compiled = cythonize(

@@ -3,6 +3,7 @@
 import argparse
 import json
 import logging
+import os
 import time
 from pathlib import Path
 
@@ -29,6 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     options = given_daemon_options(arguments)
     _log_to_stderr(options.pop("log_format", "text"))
 
+    # Before numpy comes: its BLAS would start a thread a core, and the daemon multiplies nothing larger than 3 by 3.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from posed.daemon import DaemonConfig
     from posed.daemon import run as serve
     from posed.events import Position
