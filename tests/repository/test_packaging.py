@@ -12,11 +12,10 @@ import pytest
 _ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("wheel")
+def build_wheel(out: Path, **environment: str) -> Path:
     subprocess.run(
         [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(out), str(_ROOT)],
+        env={**os.environ, **environment},
         check=True,
         capture_output=True,
     )
@@ -24,13 +23,43 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel whose filters are compiled; the machine of the tests needs a C compiler."""
+    return build_wheel(tmp_path_factory.mktemp("wheel"))
+
+
 def test_the_wheel_holds_every_module_and_data_file_of_the_three_roots(wheel: Path) -> None:
     tracked = subprocess.run(
         ["git", "ls-files", "service", "client", "proto/posed"], cwd=_ROOT, check=True, capture_output=True, text=True
     ).stdout.split()
-    expected = {name.split("/", 1)[1] for name in tracked}
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    compiled = {name.removesuffix(".pxd") + suffix for name in tracked if name.endswith(".pxd")}
+    assert compiled
+    made = compiled | {f"service/posed/fusion/kernel{suffix}.json"}
+    expected = {name.split("/", 1)[1] for name in (*tracked, *made)}
     held = {name for name in zipfile.ZipFile(wheel).namelist() if not name.startswith("posed-")}
     assert held == expected
+
+
+@pytest.mark.parametrize("environment", [{"CC": "/nonexistent"}, {"POSED_PURE": "1"}], ids=["no compiler", "pure"])
+def test_a_wheel_without_compiled_filters_runs_them_interpreted(environment: dict[str, str], tmp_path: Path) -> None:
+    built = build_wheel(tmp_path / "wheel", **environment)
+    assert built.name.endswith("-py3-none-any.whl")
+    with zipfile.ZipFile(built) as archive:
+        archive.extractall(tmp_path / "installed")
+    path = os.pathsep.join(
+        [str(tmp_path / "installed"), sysconfig.get_paths()["purelib"], sysconfig.get_paths()["platlib"]]
+    )
+    done = subprocess.run(
+        [sys.executable, "-S", "-m", "posed.cli", "--version"],
+        env={**os.environ, "PYTHONPATH": path},
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert done.stdout.endswith(", filters interpreted\n")
 
 
 def test_an_installed_wheel_shows_live_poses(wheel: Path, tmp_path: Path) -> None:

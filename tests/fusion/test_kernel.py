@@ -1,0 +1,81 @@
+"""Compiled filters compute what the interpreter computes, to the last bit, and are never older than their source."""
+
+import os
+import shutil
+import subprocess
+import sys
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+import pytest
+
+from posed.fusion.kernel import kernel
+
+FUSION = Path(__file__).parents[2] / "service" / "posed" / "fusion"
+
+# Half an hour's worth of defects in a few minutes: turns of all sizes, gaps, disorder, NaN, magnets, lost gyroscope.
+FUSE = """
+import hashlib, json, sys
+import numpy as np
+from posed.fusion import FILTERS, PACKAGED, make_filter
+from posed.fusion.kernel import kernel
+
+rng = np.random.default_rng(7)
+print(kernel())
+for name in sorted(FILTERS.keys() - set(PACKAGED)):
+    digest = hashlib.sha256()
+    for turning in (0.003, 0.1, 1.0, 5.0):
+        count = 6000
+        kinds = rng.choice([1, 2, 4], count)
+        steps = rng.integers(0, 6_000_000, count)
+        odd = rng.random(count)
+        steps[odd < 0.01] = -4_000_000
+        steps[odd > 0.9995] = 700_000_000
+        values = rng.normal(0.0, 1.0, (count, 3)) * 0.2
+        values[kinds == 1] += (0.0, 5.0, 8.0)
+        values[kinds == 2] = values[kinds == 2] * 3.0 + (5.0, 20.0, -40.0)
+        values[kinds == 4] *= turning / 0.2
+        values[(kinds == 2) & (np.arange(count) // 1000 == 4)] *= 1.5
+        values[rng.random(count) < 0.005] = np.nan
+        kinds[(kinds == 4) & (np.arange(count) // 500 == 7)] = 1
+        rows = zip(kinds.tolist(), np.cumsum(steps).tolist(), values.tolist(), strict=True)
+        events = [(kind, t, x, y, z) for kind, t, (x, y, z) in rows]
+        orientation_filter = make_filter(name)
+        for start in range(0, count, 40):
+            orientation_filter.update_batch(events[start : start + 40])
+            digest.update(repr(orientation_filter.orientation()).encode())
+            digest.update(json.dumps(orientation_filter.save()).encode())
+    print(name, digest.hexdigest())
+"""
+
+
+def run(script: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    clean = {key: value for key, value in os.environ.items() if key != "POSED_PURE"}
+    command = [sys.executable, "-c", script]
+    return subprocess.run(command, env={**clean, **environment}, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.skipif(kernel() == "interpreted", reason="the filters are not compiled here; install with a C compiler")
+def test_compiled_and_interpreted_filters_agree_to_the_last_bit() -> None:
+    compiled, interpreted = run(FUSE), run(FUSE, POSED_PURE="1")
+    assert compiled.stdout.startswith("compiled\n"), compiled.stderr
+    assert interpreted.stdout.startswith("interpreted\n"), interpreted.stderr
+    assert compiled.stdout.splitlines()[1:] == interpreted.stdout.splitlines()[1:]
+    assert "dcm " in compiled.stdout
+
+
+@pytest.mark.skipif(kernel() == "interpreted", reason="the filters are not compiled here; install with a C compiler")
+@pytest.mark.parametrize("edited", ["dcm.py", "gate.pxd"])
+def test_a_source_edited_since_it_was_compiled_is_refused_with_the_remedy(edited: str, tmp_path: Path) -> None:
+    copy = tmp_path / "posed" / "fusion"
+    shutil.copytree(FUSION, copy)
+    assert (copy / f"dcm{EXTENSION_SUFFIXES[0]}").exists()
+    with (copy / edited).open("a") as source:
+        source.write("\n")
+    script = f"import sys, posed; posed.__path__ = [{str(tmp_path / 'posed')!r}, *posed.__path__]; import posed.fusion"
+    refused = run(script)
+    assert refused.returncode != 0
+    assert "StaleKernelError" in refused.stderr
+    assert str(copy / edited) in refused.stderr
+    assert "pip install -e ." in refused.stderr
+    assert run(script, POSED_PURE="1").returncode == 0
