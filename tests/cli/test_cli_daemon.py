@@ -13,6 +13,7 @@ from cli_shell import Shell
 from posed import cli
 from posed.cli import serve
 from posed.client import PoseClient
+from posed.fusion import DEFAULT_FILTER
 
 _NO_DAEMON = "posed: error: no daemon is running; start one with 'posed start'\n"
 
@@ -70,7 +71,7 @@ def test_status_tells_what_a_client_uses_and_is_no_client(shell: Shell) -> None:
         assert client.next_pose(20) is not None
         facts = json.loads(shell.run("status", "--json").stdout)
         shown = shell.run("status").stdout
-    assert (facts["running"], facts["pid"], facts["filter"]) == (True, shell.daemon_pid, "dcm")
+    assert (facts["running"], facts["pid"], facts["filter"]) == (True, shell.daemon_pid, DEFAULT_FILTER)
     assert (facts["bound_clients"], facts["connections"]) == (1, 1)
     assert {sensor["type"]: sensor["configured_hz"] for sensor in facts["sensors"]} == {
         "accelerometer": 50,

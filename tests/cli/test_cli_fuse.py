@@ -9,6 +9,7 @@ import pytest
 from cli_shell import Shell
 
 from posed.cli import fuse, main
+from posed.fusion import DEFAULT_FILTER
 
 
 def _rows(text: str) -> list[dict[str, str]]:
@@ -26,7 +27,7 @@ def test_poses_of_a_recording(recording: Path, capsys: pytest.CaptureFixture[str
     for row in rows:
         assert math.hypot(*(float(row[axis]) for axis in ("qx", "qy", "qz", "qw"))) == pytest.approx(1)
         assert float(row["qw"]) >= 0
-        assert (row["rate_mode"], row["filter"]) == ("GAME", "dcm")
+        assert (row["rate_mode"], row["filter"]) == ("GAME", DEFAULT_FILTER)
         assert int(row["timestamp_ns"]) <= 7_000_000_000 + int(row["sequence"]) * 100_000_000
     # Turned by 0.5 rad/s for a second, and back.
     headings = [2 * math.atan2(float(row["qz"]), float(row["qw"])) for row in rows]

@@ -26,6 +26,7 @@ from posed.client import (
     Truth,
 )
 from posed.errors import InvalidArgumentError
+from posed.fusion import DEFAULT_FILTER
 
 Eventually = Callable[[Callable[[], object]], None]
 
@@ -92,7 +93,7 @@ def test_poses_come_on_their_grid_with_the_events_of_table_2(desk: Any, mode: in
     fused = sum(p.events_fused for p in poses[5:]) / (20 * 0.1)
     assert fused == pytest.approx(_EVENTS_PER_S[mode], rel=0.1)
     assert {p.rate_mode for p in poses} == {{0: "FASTEST", 1: "GAME", 2: "UI", 3: "NORMAL"}[mode]}
-    assert {p.filter for p in poses} == {"dcm"}
+    assert {p.filter for p in poses} == {DEFAULT_FILTER}
     assert 0 < last.heading_accuracy < math.pi
     assert last.position is None
     assert last.age_s < 5
