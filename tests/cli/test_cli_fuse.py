@@ -3,12 +3,15 @@
 import csv
 import io
 import math
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from cli_shell import Shell
 
 from posed.cli import fuse, main
+from posed.errors import InvalidArgumentError
+from posed.events import Pose
 from posed.fusion import DEFAULT_FILTER
 
 
@@ -122,3 +125,50 @@ def test_aligned_poses_say_how_far_they_were_turned_on(recording: Path, capsys: 
         turn = 2 * (math.atan2(float(other["qz"]), float(other["qw"])) - math.atan2(float(one["qz"]), float(one["qw"])))
         assert turn == pytest.approx(float(one["wz"]) * int(other["predicted_ns"]) * 1e-9, abs=1e-3)
     assert max(int(row["predicted_ns"]) for row in turned) >= 100_000_000
+
+
+def test_a_failed_fuse_writes_nothing(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> Iterator[Pose]:
+        raise InvalidArgumentError("no magnetometer")
+        yield
+
+    output = tmp_path / "poses.csv"
+    output.write_text("precious")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.setattr(fuse, "fuse_recording", broken)
+    assert main(["fuse", str(recording), "-o", str(output)]) == 1
+    assert main(["fuse", str(recording)]) == 1
+    assert output.read_text() == "precious"
+    assert sorted(tmp_path.iterdir()) == before
+    assert capsys.readouterr().out == ""
+
+
+def test_a_fuse_that_breaks_midway_leaves_the_old_output(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(_: Pose) -> str:
+        raise InvalidArgumentError("midway")
+
+    output = tmp_path / "poses.csv"
+    output.write_text("precious")
+    before = sorted(tmp_path.iterdir())
+    monkeypatch.setattr(fuse, "csv_row", broken)
+    assert main(["fuse", str(recording), "-o", str(output)]) == 1
+    assert output.read_text() == "precious"
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("link", [None, Path.symlink_to, Path.hardlink_to])
+def test_the_recording_is_no_output(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], link: Callable[[Path, Path], None] | None
+) -> None:
+    output = recording
+    if link is not None:
+        output = tmp_path / "link.csv"
+        link(output, recording)
+    before = recording.read_bytes()
+    assert main(["fuse", str(recording), "-o", str(output)]) == 1
+    assert "is the recording itself" in capsys.readouterr().err
+    assert recording.read_bytes() == before

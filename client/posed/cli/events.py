@@ -10,6 +10,7 @@ import sys
 from posed.cli.connection import PACKAGE, require_daemon
 from posed.cli.options import RATE_MODES, positive_count
 from posed.cli.sensors import short_name, unit
+from posed.cli.watch import exit_on_signals
 from posed.client import SENSOR_STATUS_ACCURACY_HIGH, Sensor, SensorEvent, SensorManager, TriggerEvent
 from posed.client.sensor import period_of_delay_us
 from posed.errors import InvalidArgumentError, PosedError
@@ -54,6 +55,7 @@ Keys of --json: sensor (its type), handle, timestamp_ns (sample time), values (i
 def run(arguments: argparse.Namespace) -> int:
     """Print events until Ctrl-C, --count or the end of the reader."""
     require_daemon()
+    exit_on_signals()
     try:
         with SensorManager(package=PACKAGE, on_service_disconnected=_tell_lost, on_binding_died=_tell_ended) as manager:
             sensor = find_sensor(arguments.sensor, manager.get_sensor_list())

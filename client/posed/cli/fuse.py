@@ -2,7 +2,10 @@
 
 import argparse
 import contextlib
+import errno
 import heapq
+import itertools
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -48,6 +51,8 @@ same events and a row each at every instant. The same recording and options give
 
 def run(arguments: argparse.Namespace) -> int:
     """Fuse as fast as it goes."""
+    if arguments.output is not None:
+        _refuse_input_as_output(arguments.recording, arguments.output)
     recording = load_recording(arguments.recording)
     for kind, count in recording.dropped_rows.items():
         if count:
@@ -65,11 +70,13 @@ def run(arguments: argparse.Namespace) -> int:
         for name in arguments.filter
     ]
     poses = heapq.merge(*streams, key=lambda pose: pose.instant_ns)
+    # A recording that cannot be fused says so at its first pose: before anything is written.
+    first = list(itertools.islice(poses, 1))
     written = 0
     with _output(arguments.output) as output, _progress(output) as progress:
         bar = progress.add_task(recording.name, total=recording.end_ns - recording.start_ns)
         output.write(f"{HEADER}\n")
-        for pose in poses:
+        for pose in itertools.chain(first, poses):
             output.write(csv_row(pose))
             written += 1
             progress.update(bar, completed=pose.instant_ns - recording.start_ns)
@@ -100,12 +107,31 @@ def _output(path: Path | None) -> Iterator[TextIO]:
     if path is None:
         yield sys.stdout
         return
+    # Written beside the target of a link and renamed when whole; a device or a pipe cannot be replaced.
+    target = Path(os.path.realpath(path))
+    special = target.exists() and not target.is_file()
+    beside = target if special else target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        file = path.open("w", encoding="ascii", newline="\n")
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        file = beside.open("w", encoding="ascii", newline="\n")
     except OSError as error:
         raise InvalidArgumentError(f"cannot write {path}: {error.strerror}; name a file that can be written") from error
-    with file:
-        yield file
+    try:
+        with file:
+            yield file
+        if not special:
+            beside.replace(target)
+    except BaseException:
+        if not special:
+            beside.unlink(missing_ok=True)
+        raise
+
+
+def _refuse_input_as_output(recording: Path, output: Path) -> None:
+    inputs = [recording, *recording.iterdir()] if recording.is_dir() else [recording]
+    if output.exists() and any(path.exists() and path.samefile(output) for path in inputs):
+        raise InvalidArgumentError(f"output {output} is the recording itself; name another file")
 
 
 def _progress(output: TextIO) -> Progress:

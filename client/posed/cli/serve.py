@@ -4,12 +4,15 @@ import argparse
 import json
 import logging
 import os
+import sys
 import time
 from pathlib import Path
 
 from posed.cli.options import add_daemon_options, given_daemon_options
 
 _UNIT = Path(__file__).with_name("posed.service")
+# The unit names the place of a --user install; in a virtual environment the command stands beside the interpreter.
+_COMMAND = Path(sys.executable).with_name("posed")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,7 +24,7 @@ It serves until SIGTERM, Ctrl-C or 'posed stop'. Exit code 75: another daemon of
 
 As a systemd user service:
   mkdir -p ~/.config/systemd/user
-  cp {_UNIT} ~/.config/systemd/user/
+  sed 's|^ExecStart=.*|ExecStart={_COMMAND} serve|' {_UNIT} > ~/.config/systemd/user/posed.service
   systemctl --user enable --now posed"""
 
 

@@ -1,6 +1,7 @@
 """PoseClient: the fused pose of a running posed, as an iterator, a callback or the latest value."""
 
 import dataclasses
+import numbers
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -287,6 +288,6 @@ def _sampling_period_us(rate_mode: int) -> int:
 
 
 def _pose_period_us(pose_rate_hz: float) -> int:
-    if not 1 <= pose_rate_hz <= 200:
-        raise InvalidArgumentError(f"pose rate {pose_rate_hz!r} Hz is outside 1 to 200 Hz")
+    if not isinstance(pose_rate_hz, numbers.Real) or not 1 <= pose_rate_hz <= 200:
+        raise InvalidArgumentError(f"pose rate {pose_rate_hz!r} is no rate; give a number of Hz, 1 to 200")
     return round(1e6 / pose_rate_hz)

@@ -24,10 +24,14 @@ def open_source(
 
         if speed != 1.0:
             raise InvalidArgumentError(f"speed = {speed} with source {spec!r}; allowed: 1 (only a replay has a speed)")
+        if loop:
+            raise InvalidArgumentError(f"loop with source {spec!r}; leave it out (only a replay has an end)")
         if seed < 0:
             raise InvalidArgumentError(f"seed = {seed}; allowed: 0 or more")
         return SimulatedPhone(profile, clock, make_script(rest or DEFAULT_SCRIPT, seed), seed)
-    if kind == "replay" and rest:
+    if kind == "replay":
+        if not rest:
+            raise InvalidArgumentError(f"source {spec!r} lacks its path; give replay:PATH")
         from posed.hal.replay import open_replay
 
         return open_replay(Path(rest), profile, clock, speed=speed, loop=loop)
