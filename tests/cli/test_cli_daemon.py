@@ -5,6 +5,7 @@ import json
 import os
 import select
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -150,6 +151,8 @@ def test_a_bound_daemon_says_so(shell: Shell) -> None:
     [
         ("--source=replay:/nowhere", "recording /nowhere is missing"),
         ("--source=radio", "source 'radio' is unknown"),
+        ("--source=replay:", "source 'replay:' lacks its path"),
+        ("--loop", "loop with source 'sim"),
         ("--filter=best", "no filter is named 'best'"),
         ("--profile=pixel", "profile 'pixel' is not shipped"),
     ],
@@ -173,6 +176,11 @@ def test_the_systemd_unit_names_a_command_that_exists() -> None:
     assert command in cli.COMMANDS
     assert unit["Service"]["Type"] == "notify"
     assert unit["Service"]["RestartPreventExitStatus"] == str(cli.EX_TEMPFAIL)
+
+
+def test_the_systemd_recipe_names_the_command_that_runs(shell: Shell) -> None:
+    command = Path(sys.executable).with_name("posed")
+    assert f"ExecStart={command} serve" in shell.run("serve", "--help").stdout
 
 
 def test_a_daemon_told_to_align_its_poses_says_so_in_each(shell: Shell) -> None:

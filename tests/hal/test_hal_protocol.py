@@ -20,7 +20,9 @@ class Phone:
 
     def __init__(self, spec: str) -> None:
         self.clock = VirtualClock(1_000_000_000)
-        self.source: SensorSource = open_source(spec, load_profile("patonis2018"), self.clock, loop=True)
+        self.source: SensorSource = open_source(
+            spec, load_profile("patonis2018"), self.clock, loop=spec.startswith("replay:")
+        )
 
     def now_ns(self) -> int:
         return self.source.time_map.to_sample(self.clock.now_ns())
