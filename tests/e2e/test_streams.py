@@ -123,7 +123,7 @@ def test_pose_rates_have_streams_of_their_own(desk: Any) -> None:
         hundred.set_pose_rate(20)
         after = hundred.next_pose(timeout_s=5)
         assert after.sequence < fast[-1].sequence
-    with pytest.raises(InvalidArgumentError, match="201 Hz"):
+    with pytest.raises(InvalidArgumentError, match="201"):
         PoseClient(pose_rate_hz=201)
 
 

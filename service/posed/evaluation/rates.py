@@ -11,6 +11,7 @@ from posed.events import EventBatch, FlatEvent, RateMode
 from posed.hal.profile import DeviceProfile, load_profile
 from posed.hal.recording import Recording
 from posed.hal.replay import ReplaySource
+from posed.sensors.quantisation import Quantiser, as_listed
 
 ModeName = Literal["native", "FASTEST", "GAME", "UI", "NORMAL"]
 MODES: tuple[ModeName, ...] = get_args(ModeName)
@@ -24,8 +25,9 @@ def mode_events(trial: Trial, mode: ModeName, profile: DeviceProfile | None = No
     """Return a trial's events at a mode, in one order: by time, ties by sensor type (gyroscope last).
 
     The modes are thinned from the recording at the profile's rates (default: PROFILE): the gyroscope by interval mean,
-    accelerometer and magnetometer by the sample nearest to the grid, at its own time. A mode as fast as the recording
-    leaves a stream as it is. Raises InvalidArgumentError for an unknown mode.
+    accelerometer and magnetometer by the sample nearest to the grid, at its own time; a mode as fast as the recording
+    leaves a stream's rate as it is. Values are rounded to an eighth of the profile's resolution, as the sensor service
+    does. Raises InvalidArgumentError for an unknown mode.
     """
     return mode_batch(trial, mode, profile).flat({int(kind): kind for kind in INPUTS})
 
@@ -42,7 +44,9 @@ def mode_batch(trial: Trial, mode: ModeName, profile: DeviceProfile | None = Non
     for kind in INPUTS:
         source.batch(int(kind), RateMode[mode].sampling_period_us * 1000, 0)
         source.activate(int(kind), True)
-    return source.drain(recording.end_ns)
+    quantisers = {info.handle: Quantiser(as_listed(info)) for info in source.sensors}
+    drained = source.drain(recording.end_ns)
+    return EventBatch({handle: quantisers[handle](column) for handle, column in drained.columns.items()})
 
 
 def pose_instants(
