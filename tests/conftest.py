@@ -1,4 +1,4 @@
-"""What every test may use: the recordings folder, a browser, and the rule that a demanded need may not skip."""
+"""What every test may use: recordings, compiled filters, a browser, and the rule that a demanded need may not skip."""
 
 import os
 import shutil
@@ -33,6 +33,15 @@ def data_dir() -> Path:
     if not named or not Path(named).is_dir():
         _lacking("data", f"POSED_DATA is {named!r}, not a folder of recordings; set it to run this test")
     return Path(named)
+
+
+@pytest.fixture(scope="session")
+def compiled() -> None:
+    """The filters are compiled; skips where they are not, fails where POSED_REQUIRE demands it."""
+    from posed.fusion.kernel import kernel
+
+    if kernel() == "interpreted":
+        _lacking("compiler", "the filters are not compiled; install with a C compiler, and unset POSED_PURE")
 
 
 @pytest.fixture(scope="session")

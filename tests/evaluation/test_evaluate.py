@@ -75,6 +75,17 @@ def test_what_cannot_be_read_is_named(folder: Path, evaluation: Evaluation) -> N
     assert re.search(r"z\.csv:2: 4 columns", second.reason)
 
 
+def test_a_damaged_rotation_vector_skips_its_trial_alone(tmp_path: Path) -> None:
+    root = write_attitude_set(tmp_path / "phone", ["P_AR", "Q_AR"], compress=False)
+    (damaged,) = (root / "trials" / "Q_AR").glob("rotation-vector.txt")
+    damaged.write_text(damaged.read_text()[:4000] + " broken\n")
+    found = evaluate(find_trials([root]), Plan(("dcm", PHONE), ("GAME",)), jobs=1)
+    assert [(each.trial, each.filter) for each in found.results] == [("P_AR", "dcm"), ("P_AR", PHONE)]
+    (skipped,) = found.skipped
+    assert skipped.path == str(damaged.parent)
+    assert "rotation-vector.txt" in skipped.reason
+
+
 def test_a_plan_is_checked_before_anything_is_read() -> None:
     for plan, said in (
         (Plan(("best",)), "no filter is named 'best'"),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posed.events import FlatEvent, Float64Array, Int64Array, SensorType
-from posed.fusion.dcm import DcmFilter
+from posed.fusion.filter import OrientationFilter
 
 GRAVITY = 9.80665
 FIELD = np.array([0.0, 22.0, -42.0])
@@ -110,14 +110,14 @@ def between(events: FlatEvents, start_s: float, end_s: float) -> FlatEvents:
     return FlatEvents(events.sensor_type[keep], events.timestamp_ns[keep], events.values[keep])
 
 
-def error_deg(dcm: DcmFilter, truth: Float64Array) -> float:
+def error_deg(dcm: OrientationFilter, truth: Float64Array) -> float:
     """Return the angle between the filter's orientation and the true matrix, degrees."""
     answer = dcm.orientation()
     assert answer is not None
     return float(np.degrees(np.linalg.norm(rotation_vector(truth.T @ matrix(answer.quaternion)))))
 
 
-def heading_deg(dcm: DcmFilter) -> float:
+def heading_deg(dcm: OrientationFilter) -> float:
     """Return the azimuth of the device's y axis, degrees clockwise from north."""
     answer = dcm.orientation()
     assert answer is not None

@@ -7,7 +7,9 @@ import pytest
 from synthetic_phone import FIELD, GRAVITY, error_deg, matrix, rotation, rotation_vector, sense
 
 from posed.events import FilterStatus, Float64Array, SensorType
+from posed.fusion import make_filter
 from posed.fusion.dcm import DcmFilter
+from posed.fusion.filter import OrientationFilter
 
 HALF = np.sqrt(0.5)
 
@@ -62,7 +64,9 @@ def table_3() -> list[Float64Array]:
     return [u @ vt for u, _, vt in factors]
 
 
-def stand(dcm: DcmFilter, acceleration: Float64Array, field: Float64Array, seconds: float, start_ns: int = 0) -> None:
+def stand(
+    dcm: OrientationFilter, acceleration: Float64Array, field: Float64Array, seconds: float, start_ns: int = 0
+) -> None:
     """Feed a phone that does not turn, at 50 Hz."""
     for k in range(round(seconds * 50) + 1):
         t = start_ns + k * 20_000_000
@@ -86,11 +90,12 @@ def test_android_pose(pose: str) -> None:
     assert answer.status == FilterStatus.AT_REST
 
 
+@pytest.mark.parametrize("name", ["dcm", "dcm-literal"])
 @pytest.mark.parametrize("row", range(24))
-def test_table_3(row: int) -> None:
+def test_table_3(row: int, name: str) -> None:
     truth = table_3()[row]
     assert np.linalg.det(truth) == pytest.approx(1.0)
-    dcm = DcmFilter()
+    dcm = make_filter(name)
     stand(dcm, truth.T @ (0.0, 0.0, GRAVITY), truth.T @ FIELD, 1.0)
     assert error_deg(dcm, truth) < 0.1
 

@@ -12,8 +12,12 @@ from synthetic_phone import FASTEST, GAME, FlatEvents, rotation, sense
 from posed.errors import InvalidArgumentError
 from posed.events import SensorType
 from posed.fusion.dcm import DcmFilter
+from posed.fusion.dcm_literal import LiteralFilter
+from posed.fusion.dcm_literal_state import LiteralState
 from posed.fusion.dcm_state import DcmState
 
+Kind = type[DcmFilter] | type[LiteralFilter]
+both = pytest.mark.parametrize("kind", [DcmFilter, LiteralFilter])
 KINDS = np.array([SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD, SensorType.GYROSCOPE], np.int64)
 
 
@@ -37,17 +41,18 @@ def streams(draw: st.DrawFn) -> FlatEvents:
     return FlatEvents(kinds, start + np.cumsum(steps), values)
 
 
+@both
 @settings(deadline=None, max_examples=60)
-@given(streams(), st.lists(st.integers(0, 400), max_size=8))
-def test_cuts_do_not_change_a_bit(events: FlatEvents, cuts: list[int]) -> None:
-    whole = DcmFilter()
+@given(events=streams(), cuts=st.lists(st.integers(0, 400), max_size=8))
+def test_cuts_do_not_change_a_bit(kind: Kind, events: FlatEvents, cuts: list[int]) -> None:
+    whole = kind()
     whole.update_batch(events)
-    cut = DcmFilter()
+    cut = kind()
     edges = [0, *sorted(min(c, len(events)) for c in cuts), len(events)]
     for start, end in itertools.pairwise(edges):
         cut.update_batch(events[start:end])
         cut.orientation()
-    single = DcmFilter()
+    single = kind()
     for k in range(len(events)):
         single.update(SensorType(events.sensor_type[k]), events.timestamp_ns[k], *events.values[k])
     assert cut.state == whole.state
@@ -55,12 +60,13 @@ def test_cuts_do_not_change_a_bit(events: FlatEvents, cuts: list[int]) -> None:
     assert cut.orientation() == whole.orientation() == single.orientation()
 
 
+@both
 @settings(deadline=None, max_examples=60)
-@given(streams(), st.integers(0, 400))
-def test_saving_in_the_middle_does_not_change_a_bit(events: FlatEvents, at: int) -> None:
-    whole = DcmFilter()
+@given(events=streams(), at=st.integers(0, 400))
+def test_saving_in_the_middle_does_not_change_a_bit(kind: Kind, events: FlatEvents, at: int) -> None:
+    whole = kind()
     whole.update_batch(events[:at])
-    restored = DcmFilter()
+    restored = kind()
     restored.restore(json.loads(json.dumps(whole.save(), allow_nan=False)))
     assert restored.state == whole.state
     whole.update_batch(events[at:])
@@ -69,33 +75,42 @@ def test_saving_in_the_middle_does_not_change_a_bit(events: FlatEvents, at: int)
     assert restored.orientation() == whole.orientation()
 
 
+@both
 @settings(deadline=None, max_examples=60)
-@given(streams())
-def test_the_state_stays_finite_and_the_matrix_a_rotation(events: FlatEvents) -> None:
-    dcm = DcmFilter()
-    dcm.update_batch(events)
-    json.dumps(dcm.save(), allow_nan=False)
-    c = dcm.state.matrix
-    rows = np.array([[c.east_x, c.east_y, c.east_z], [c.north_x, c.north_y, c.north_z], [c.up_x, c.up_y, c.up_z]])
-    assert rows @ rows.T == pytest.approx(np.eye(3), abs=1e-12)
-    assert np.linalg.det(rows) == pytest.approx(1.0)
-    assert dcm.state.tilt_variance >= 0.0
-    assert dcm.state.heading_variance >= 0.0
-    answer = dcm.orientation()
+@given(events=streams())
+def test_the_state_stays_finite_and_the_answer_a_rotation(kind: Kind, events: FlatEvents) -> None:
+    one = kind()
+    one.update_batch(events)
+    json.dumps(one.save(), allow_nan=False)
+    answer = one.orientation()
     if answer is not None:
         assert np.linalg.norm(answer.quaternion) == pytest.approx(1.0)
         assert answer.quaternion[3] >= 0.0
         assert 0.0 < answer.heading_accuracy <= np.pi / np.sqrt(3)
 
 
+@settings(deadline=None, max_examples=60)
+@given(streams())
+def test_the_matrix_stays_a_rotation(events: FlatEvents) -> None:
+    dcm = DcmFilter()
+    dcm.update_batch(events)
+    c = dcm.state.matrix
+    rows = np.array([[c.east_x, c.east_y, c.east_z], [c.north_x, c.north_y, c.north_z], [c.up_x, c.up_y, c.up_z]])
+    assert rows @ rows.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(rows) == pytest.approx(1.0)
+    assert dcm.state.tilt_variance >= 0.0
+    assert dcm.state.heading_variance >= 0.0
+
+
+@both
 @pytest.mark.parametrize("start_ns", [-(2**40), -1_000_000_000, 2**61])
-def test_the_origin_of_time_does_not_matter(start_ns: int) -> None:
+def test_the_origin_of_time_does_not_matter(kind: Kind, start_ns: int) -> None:
     def attitude(t: float) -> np.ndarray:
         return rotation(0.3 * np.sin(t), 0.2 * t, 0.1)
 
-    here = DcmFilter()
+    here = kind()
     here.update_batch(sense(attitude, 3.0, FASTEST))
-    there = DcmFilter()
+    there = kind()
     there.update_batch(sense(attitude, 3.0, FASTEST, start_ns=start_ns))
     one, other = here.orientation(), there.orientation()
     assert one is not None
@@ -133,3 +148,4 @@ def test_a_spoilt_save_is_refused_and_leaves_the_filter_alone(spoil, named) -> N
 def test_equal_streams_give_equal_states() -> None:
     assert DcmFilter().state == DcmFilter().state
     assert DcmFilter().state != DcmState()
+    assert LiteralFilter().state == LiteralState()

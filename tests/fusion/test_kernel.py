@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from posed.fusion.kernel import kernel
-
 FUSION = Path(__file__).parents[2] / "service" / "posed" / "fusion"
 
 # Half an hour's worth of defects in a few minutes: turns of all sizes, gaps, disorder, NaN, magnets, lost gyroscope.
@@ -49,13 +47,36 @@ for name in sorted(FILTERS.keys() - set(PACKAGED)):
 """
 
 
-def run(script: str, **environment: str) -> subprocess.CompletedProcess[str]:
+# One recording as it is: for each filter of ours the bits of what it says every two seconds, and of what it saves.
+FUSE_RECORDING = """
+import hashlib, json, sys
+from pathlib import Path
+from posed.evaluation.rates import mode_events
+from posed.evaluation.trials import load_trial
+from posed.fusion import make_filter
+from posed.fusion.kernel import kernel
+
+print(kernel())
+events = mode_events(load_trial(Path(sys.argv[1])), "GAME")[:18_000]
+for name in ("dcm", "dcm-adaptive"):
+    orientation_filter = make_filter(name)
+    for start in range(0, len(events), 300):
+        orientation_filter.update_batch(events[start : start + 300])
+        answer = orientation_filter.orientation()
+        if answer is not None:
+            numbers = (*answer.quaternion, *answer.angular_rate, answer.heading_accuracy)
+            print(name, answer.timestamp_ns, int(answer.status), *map(float.hex, numbers))
+    print(hashlib.sha256(json.dumps(orientation_filter.save()).encode()).hexdigest())
+"""
+
+
+def run(script: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     clean = {key: value for key, value in os.environ.items() if key != "POSED_PURE"}
-    command = [sys.executable, "-c", script]
+    command = [sys.executable, "-c", script, *arguments]
     return subprocess.run(command, env={**clean, **environment}, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.skipif(kernel() == "interpreted", reason="the filters are not compiled here; install with a C compiler")
+@pytest.mark.usefixtures("compiled")
 def test_compiled_and_interpreted_filters_agree_to_the_last_bit() -> None:
     compiled, interpreted = run(FUSE), run(FUSE, POSED_PURE="1")
     assert compiled.stdout.startswith("compiled\n"), compiled.stderr
@@ -64,7 +85,18 @@ def test_compiled_and_interpreted_filters_agree_to_the_last_bit() -> None:
     assert "dcm " in compiled.stdout
 
 
-@pytest.mark.skipif(kernel() == "interpreted", reason="the filters are not compiled here; install with a C compiler")
+@pytest.mark.usefixtures("compiled")
+def test_a_recording_gives_the_same_bits_compiled_and_interpreted(data_dir: Path) -> None:
+    trial = str(sorted((data_dir / "broad").glob("*.mat"))[0])
+    compiled, interpreted = run(FUSE_RECORDING, trial), run(FUSE_RECORDING, trial, POSED_PURE="1")
+    assert compiled.stdout.startswith("compiled\n"), compiled.stderr
+    assert interpreted.stdout.startswith("interpreted\n"), interpreted.stderr
+    said = compiled.stdout.splitlines()[1:]
+    assert said == interpreted.stdout.splitlines()[1:]
+    assert len(said) > 100
+
+
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("edited", ["dcm.py", "gate.pxd"])
 def test_a_source_edited_since_it_was_compiled_is_refused_with_the_remedy(edited: str, tmp_path: Path) -> None:
     copy = tmp_path / "posed" / "fusion"

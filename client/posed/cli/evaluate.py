@@ -63,6 +63,9 @@ to east, magnetic north, up. In a folder they are found at any depth.
 native is every event as recorded; the modes are the rates of the paper's tablet: the gyroscope by interval mean, the
 others by nearest sample. {PHONE} is the phone's own rotation vector, where recorded.
 
+game and geomag are to be judged on inclination: the heading of game is free, as it has no magnetometer, and that of
+geomag noisy, as it has no gyroscope.
+
 JSON: "results" has dataset, trial, groups, filter, mode; total, heading, inclination, pose10hz_total (RMSE, degrees);
 ns_per_event (CPU time). "summary" has dataset, filter, mode, trials, total_mean, total_median, heading_mean,
 inclination_mean. Also "groups", "poses", "differences" and "skipped".

@@ -153,10 +153,10 @@ def _outcomes(trials: Sequence[Path], plan: Plan, jobs: int) -> Iterator[tuple[P
 
 def _outcome(path: Path, plan: Plan) -> tuple[Result, ...] | Skipped:
     try:
-        trial = load_trial(path, plan.calibration)
+        # Inside too: a phone's own rotation vector is read when it is first asked for.
+        return evaluate_trial(load_trial(path, plan.calibration), plan)
     except RecordingError as error:
         return Skipped(str(path), str(error))
-    return evaluate_trial(trial, plan)
 
 
 def _maker(name: str) -> Callable[[], OrientationFilter]:

@@ -34,6 +34,12 @@ def _dcm(noise: SensorNoise) -> OrientationFilter:
     return DcmFilter(DcmParams(noise=noise))
 
 
+def _literal(noise: SensorNoise) -> OrientationFilter:
+    from posed.fusion.dcm_literal import LiteralFilter, LiteralParams
+
+    return LiteralFilter(LiteralParams(noise=noise))
+
+
 def _adaptive(noise: SensorNoise) -> OrientationFilter:
     """The noise of the parts is far below what this filter reckons with, so it is not asked for."""
     from posed.fusion.adaptive import AdaptiveFilter
@@ -58,6 +64,7 @@ DEFAULT_FILTER = "dcm-adaptive"
 FILTERS: Mapping[str, Callable[[SensorNoise], OrientationFilter]] = {
     "dcm": _dcm,
     "dcm-adaptive": _adaptive,
+    "dcm-literal": _literal,
     "game": _game,
     "geomag": _geomag,
 }
