@@ -279,7 +279,8 @@ def test_the_poses_of_a_fast_replay_equal_those_of_fuse(desk: Any, tmp_path: Pat
 
 
 def test_a_replay_at_its_end_says_so(desk: Any, tmp_path: Path) -> None:
-    desk.serve("--source", f"replay:{_recording(tmp_path / 'short.csv', 1)}", "--speed", "10")
+    # Long enough for a subscription to arrive while it plays.
+    desk.serve("--source", f"replay:{_recording(tmp_path / 'short.csv', 20)}", "--speed", "10")
     with PoseClient(every=True) as client:
         while client.next_pose(timeout_s=1) is not None:
             pass
