@@ -71,4 +71,6 @@ def _fits(value: Any, default: Any) -> bool:
 
 
 def _misfit(path: str, value: Any) -> InvalidArgumentError:
-    return InvalidArgumentError(f"the saved {path} is {value!r:.100}, which is no state of this filter; start it afresh")
+    return InvalidArgumentError(
+        f"the saved {path} is {value!r:.100}, which is no state of this filter; start it afresh"
+    )
