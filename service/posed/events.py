@@ -228,7 +228,11 @@ class FilterStatus(IntFlag):
     BAD_SAMPLE = 64
     """A NaN, infinite or degenerate sample was rejected since the last pose."""
     HEADING_FREE = 128
-    """No magnetometer sample for 1 s, or none wanted: heading runs on the gyroscope, from north if it was ever seen."""
+    """No magnetometer sample that could be used for 1 s, or none wanted.
+
+    Heading runs on the gyroscope, from north if it was ever seen."""
+    ACCELEROMETER_LOST = 256
+    """No accelerometer sample that could be used for 0.5 s: the tilt runs on the gyroscope."""
 
 
 @dataclass(slots=True)

@@ -15,6 +15,7 @@ from posed.events import SensorType
 from posed.fusion import make_filter
 from posed.fusion.adaptive import AdaptiveFilter
 from posed.fusion.adaptive_state import AdaptiveState
+from posed.fusion.held import MAX_HELD
 
 FORMS = st.sampled_from(["dcm-adaptive", "game", "geomag"])
 
@@ -105,6 +106,11 @@ def test_the_origin_of_time_does_not_matter(start_ns: int) -> None:
         (lambda saved: saved["state"]["heading"].update(variance=float("nan")), "nan"),
         (lambda saved: saved["state"]["bias"]["estimate"].update(xx=1), r"bias\.estimate\.xx is 1"),
         (lambda saved: saved["state"].update(held=[[1, 2, 3.0]]), "held"),
+        (lambda saved: saved["state"].update(held=[[1, 2, 0.0, 0.0, 9.8]] * MAX_HELD), "held"),
+        (lambda saved: saved["state"].update(held=[[int(SensorType.GYROSCOPE), 2, 0.0, 0.0, 0.0]]), "held"),
+        (lambda saved: saved["state"].update(held=[[1, 2**62, 0.0, 0.0, 9.8]]), "held"),
+        (lambda saved: saved["state"].update(time_ns=2**70), "time_ns"),
+        (lambda saved: saved["state"].update(gyro_ns=-(2**62)), "gyro_ns"),
     ],
 )
 def test_a_spoilt_save_is_refused_and_leaves_the_filter_alone(spoil, named) -> None:  # type: ignore[no-untyped-def]
@@ -116,6 +122,20 @@ def test_a_spoilt_save_is_refused_and_leaves_the_filter_alone(spoil, named) -> N
     with pytest.raises(InvalidArgumentError, match=named):
         adaptive.restore(saved)
     assert adaptive.save() == before
+
+
+@pytest.mark.parametrize("name", ["dcm", "dcm-adaptive"])
+def test_a_save_with_one_place_left_goes_on(name: str) -> None:
+    full = make_filter(name)
+    for _ in range(MAX_HELD - 1):
+        full.update(SensorType.ACCELEROMETER, 0, 0.0, 0.0, 9.8)
+    restored = make_filter(name)
+    restored.restore(full.save())
+    assert len(full.save()["state"]["held"]) == MAX_HELD - 1
+    for each in (full, restored):
+        each.update(SensorType.ACCELEROMETER, 0, 0.0, 0.0, 9.8)
+    assert restored.save() == full.save()
+    assert full.save()["state"]["held"] == []
 
 
 def test_equal_streams_give_equal_states() -> None:

@@ -58,6 +58,22 @@ def test_it_finds_a_clean_phone(name: str, swung: FlatEvents) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_it_says_what_it_takes_the_bias_for(name: str) -> None:
+    bias = (0.004, -0.003, 0.005)
+    one = made(name)
+    values, deviations = one.gyro_bias()
+    assert values == (0.0, 0.0, 0.0)
+    assert np.isnan(deviations).all()
+    one.update_batch(sense(lambda t: np.eye(3), 30.0, GAME, bias=bias))
+    values, deviations = one.gyro_bias()
+    assert values == pytest.approx(bias, abs=np.radians(0.05))
+    if name == "vqf":
+        assert 0.0 < deviations[0] < np.radians(0.1)
+    else:
+        assert np.isnan(deviations).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
 @settings(max_examples=8, deadline=None)
 @given(cuts=st.lists(st.integers(0, 4500), max_size=5))
 def test_the_result_does_not_depend_on_how_the_events_were_cut(name: str, swung: FlatEvents, cuts: list[int]) -> None:

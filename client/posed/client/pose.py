@@ -19,6 +19,7 @@ class PoseStatus(IntFlag):
     GAP = 32
     BAD_SAMPLE = 64
     HEADING_FREE = 128
+    ACCELEROMETER_LOST = 256
 
 
 def boot_time_ns() -> int:

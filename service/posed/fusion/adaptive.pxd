@@ -14,7 +14,6 @@ from posed.fusion.three_state cimport ThreeState
 
 cdef extern from "math.h":
     cpdef double sqrt(double x)
-    cpdef double atan2(double y, double x)
 
 cdef long long _ACCELEROMETER
 cdef long long _MAGNETIC_FIELD
@@ -26,10 +25,11 @@ cdef long long _MAX_LATE_NS
 cdef long long _MAX_TIME_NS
 cdef double _MAX_STEP_S
 cdef double _FIRST_STEP_S
+cdef double _STUCK_S
+cdef long long _STUCK_SAMPLES
 cdef Py_ssize_t _MAX_HELD
 cdef double _MIN_ACCELERATION2
 cdef double _MAX_MEASUREMENT2
-cdef double _MAX_RATE2
 cdef double _MIN_HORIZONTAL2
 
 @cython.final
@@ -40,6 +40,9 @@ cdef class AdaptiveFilter:
     cdef bint _use_gyroscope
     cdef bint _use_magnetometer
     cdef double _gyro_delay_s
+    cdef double _saturated_rate
+    cdef double _max_rate
+    cdef double _turning2
     cdef long long _acc_late_ns
     cdef long long _mag_late_ns
     cdef double _tilt_time_s
@@ -55,10 +58,12 @@ cdef class AdaptiveFilter:
     @cython.locals(sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double)
     cpdef update_batch(self, events)
 
-    @cython.locals(s=AdaptiveState, held=HeldEvents, newest=cython.longlong, norm2=double)
+    @cython.locals(s=AdaptiveState, held=HeldEvents, newest=cython.longlong, norm2=double, largest=double)
     cdef void _take(self, long long sensor_type, long long t, double x, double y, double z) noexcept
     cdef void _see(self, long long t) noexcept
-    @cython.locals(s=AdaptiveState, step=cython.longlong, dt=double)
+    @cython.locals(
+        s=AdaptiveState, c=DirectionCosines, step=cython.longlong, dt=double, norm2=double, about_up=double, turning=bint,
+    )
     cdef void _take_rate(self, long long t, double x, double y, double z) noexcept
     @cython.locals(
         s=AdaptiveState, interval=GyroInterval, bias=ThreeState, held=HeldEvents, c=DirectionCosines,

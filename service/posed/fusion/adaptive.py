@@ -14,7 +14,7 @@ constants of tilt and heading. The pose looks ahead over the newest interval and
 """
 
 from collections.abc import Iterable, Mapping
-from math import atan2, pi, sqrt
+from math import pi, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
@@ -44,12 +44,16 @@ _FREE_FALL = int(FilterStatus.FREE_FALL)
 _HEADING_FREE = int(FilterStatus.HEADING_FREE)
 _GAP = int(FilterStatus.GAP)
 _BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
+_ACCELEROMETER_LOST = int(FilterStatus.ACCELEROMETER_LOST)
 
 _MAX_HELD = MAX_HELD
 _MAX_STEP_NS = 500_000_000
-"""A longer step of time is a gap, without a gyroscope sample for so long it is lost, and values that stay the same to
-the last bit for so long in motion are those of a sensor that hangs."""
+"""A longer step of time is a gap, and a sensor without a sample for so long is lost."""
 _MAX_STEP_S = 0.5
+_STUCK_S = 0.5
+_STUCK_SAMPLES = 8
+"""Values that stay the same to the last bit for so long in motion, and so often, are those of a sensor that hangs. In
+motion only: noise below the last bit repeats itself on a table, and at NORMAL half a second is two samples."""
 _MAX_LATE_NS = 100_000_000
 """Before the newest interval the rate is taken to run on as it begins, which holds no longer than this."""
 _FREE_NS = 1_000_000_000
@@ -64,7 +68,6 @@ _UNKNOWN_HEADING = pi / sqrt(3.0)
 # Squared norms beyond which a sample is no measurement; comparisons are written so that NaN fails them.
 _MIN_ACCELERATION2 = 1.0**2
 _MAX_MEASUREMENT2 = 10_000.0**2
-_MAX_RATE2 = 100.0**2
 _MIN_HORIZONTAL2 = 0.01**2
 """Of the field's squared norm: within 0.6 degrees of the vertical it points nowhere."""
 
@@ -81,6 +84,10 @@ class AdaptiveFilter:
         self._use_gyroscope = p.use_gyroscope
         self._use_magnetometer = p.use_magnetometer
         self._gyro_delay_s = p.gyro_delay_s
+        # A part's range and the largest value it gives differ in the last digits.
+        self._saturated_rate = 0.99 * p.gyro_range
+        self._max_rate = 1.01 * p.gyro_range
+        self._turning2 = p.rest.bias_limit**2
         # The matrix lags its stamp as the gyroscope does: relative to it, measurements are this much late.
         self._acc_late_ns = round((p.acc_delay_s - p.gyro_delay_s) * 1e9)
         self._mag_late_ns = round((p.mag_delay_s - p.gyro_delay_s) * 1e9)
@@ -107,9 +114,7 @@ class AdaptiveFilter:
         Where no magnetometer comes within a second of the first event, gravity will do: HEADING_FREE.
         """
         s = self.state
-        free = not self._use_magnetometer or (
-            s.time_ns - s.mag_ns > _FREE_NS if s.has_mag else s.time_ns - s.first_ns > _FREE_NS
-        )
+        free = not self._use_magnetometer or (s.time_ns - (s.mag_used_ns if s.has_mag else s.first_ns) > _FREE_NS)
         if not (s.started or (free and s.tilt.known)):
             return None
         heading = s.heading
@@ -129,6 +134,10 @@ class AdaptiveFilter:
             status |= _GYRO_LOST
         if s.free_fall:
             status |= _FREE_FALL
+        # With a gyroscope, measurements are taken up to the start of its newest interval.
+        taken_ns = s.time_ns if s.gyro_lost else s.start_ns
+        if taken_ns - (s.acc_used_ns if s.has_acc else s.first_ns) > _MAX_STEP_NS:
+            status |= _ACCELEROMETER_LOST
         level = s.matrix
         c = DirectionCosines(level.north_x, level.north_y, level.north_z, level.up_x, level.up_y, level.up_z)
         bias = s.bias.estimate
@@ -184,9 +193,14 @@ class AdaptiveFilter:
         if sensor_type == _GYROSCOPE:
             if not self._use_gyroscope:
                 return
-            if not (norm2 < _MAX_RATE2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
+            largest = max(abs(x), abs(y), abs(z))
+            # The largest of three is not NaN for certain, their squared norm is.
+            if not (norm2 < _MAX_MEASUREMENT2 and largest <= self._max_rate and -_MAX_TIME_NS < t < _MAX_TIME_NS):
                 self._flag_bad_sample()
                 return
+            if largest >= self._saturated_rate:
+                # The turn was at least this one: better than none.
+                self._flag_bad_sample()
             self._see(t)
             self._take_rate(t, x, y, z)
             return
@@ -199,6 +213,14 @@ class AdaptiveFilter:
             self._flag_bad_sample()
             return
         self._see(t)
+        if t - s.newest_ns > _MAX_STEP_NS and not s.ahead:
+            # A wrong stamp, or the first sample after a gap: the next one tells.
+            s.ahead = True
+            self._flag_bad_sample()
+            return
+        s.ahead = False
+        if t > s.newest_ns:
+            s.newest_ns = t
         if s.gyro_lost:
             self._measure_alone(sensor_type, t, x, y, z)
         else:
@@ -212,19 +234,40 @@ class AdaptiveFilter:
         s = self.state
         if not s.has_time:
             s.has_time = True
-            s.time_ns = s.first_ns = t
+            s.time_ns = s.start_ns = s.first_ns = s.newest_ns = t
             s.gyro_lost = not self._use_gyroscope
 
     def _take_rate(self, t: int, x: float, y: float, z: float) -> None:
         s = self.state
+        norm2 = x * x + y * y + z * z
+        turning = norm2 > self._turning2
+        dt = 0.0
+        if s.has_gyro and t > s.gyro_ns:
+            dt = min((t - s.gyro_ns) * 1e-9, _MAX_STEP_S)
         if x != s.gyro_x or y != s.gyro_y or z != s.gyro_z or not s.has_gyro:
-            s.gyro_changed_ns = t
+            s.gyro_same = 0
+            s.gyro_same_s = 0.0
             s.gyro_x = x
             s.gyro_y = y
             s.gyro_z = z
-        elif t - s.gyro_changed_ns > _MAX_STEP_NS and x * x + y * y + z * z > 0.0:
-            self._flag_bad_sample()
-            return
+        else:
+            s.gyro_same += 1
+            if s.gyro_same_s > _STUCK_S and s.gyro_same >= _STUCK_SAMPLES:
+                self._flag_bad_sample()
+                return
+            # Exactly zero is what a simulated phone reads that is moved without being turned.
+            if turning or (s.rest.shaken and norm2 > 0.0):
+                s.gyro_same_s += dt
+        if turning:
+            c = s.matrix
+            about_up = x * c.up_x + y * c.up_y + z * c.up_z
+            if norm2 - about_up * about_up > self._turning2:
+                # A turn about the vertical leaves the accelerometer as it is.
+                s.acc_same_s += dt
+            s.mag_same_s += dt
+        s.ahead = False
+        if t > s.newest_ns:
+            s.newest_ns = t
         step = t - s.time_ns
         if step > _MAX_STEP_NS or step < -_MAX_STEP_NS:
             # Far back counts as a gap too: a source whose clock was set back must not lock the filter out.
@@ -322,21 +365,26 @@ class AdaptiveFilter:
                 return
             dt = min((t - s.acc_ns) * 1e-9, _MAX_STEP_S)
         if x != s.acc_x or y != s.acc_y or z != s.acc_z or not s.has_acc:
-            s.acc_changed_ns = t
+            s.acc_same = 0
+            s.acc_same_s = 0.0
             s.acc_x = x
             s.acc_y = y
             s.acc_z = z
+        else:
+            s.acc_same += 1
         s.has_acc = True
         s.acc_ns = t
         s.free_fall = x * x + y * y + z * z < _MIN_ACCELERATION2
         if s.free_fall:
+            s.acc_used_ns = t
             self._rest.moved()
             return
         self._rest.take_acceleration(x, y, z, dt)
         rest = s.rest
-        if t - s.acc_changed_ns > _MAX_STEP_NS and not rest.at_rest:
+        if s.acc_same_s > _STUCK_S and s.acc_same >= _STUCK_SAMPLES:
             self._flag_bad_sample()
             return
+        s.acc_used_ns = t
         c = s.matrix
         tilt = s.tilt
         if not s.gyro_lost:
@@ -385,15 +433,21 @@ class AdaptiveFilter:
                 return
             dt = min((t - s.mag_ns) * 1e-9, _MAX_STEP_S)
         if x != s.mag_x or y != s.mag_y or z != s.mag_z or not s.has_mag:
-            s.mag_changed_ns = t
+            s.mag_same = 0
+            s.mag_same_s = 0.0
             s.mag_x = x
             s.mag_y = y
             s.mag_z = z
+        else:
+            s.mag_same += 1
+            if s.gyro_lost and s.rest.shaken:
+                s.mag_same_s += dt
         s.has_mag = True
         s.mag_ns = t
-        if t - s.mag_changed_ns > _MAX_STEP_NS and not s.rest.at_rest:
+        if s.mag_same_s > _STUCK_S and s.mag_same >= _STUCK_SAMPLES:
             self._flag_bad_sample()
             return
+        s.mag_used_ns = t
         if not s.tilt.known:
             return
         c = s.matrix
@@ -426,22 +480,25 @@ class AdaptiveFilter:
             + (c.north_z * c.up_x - c.north_x * c.up_z) * y
             + (c.north_x * c.up_y - c.north_y * c.up_x) * z
         )
-        norm = sqrt(norm2)
-        dip = atan2(-vertical, horizontal)
         earth = self._earth
         if not s.earth.known:
-            earth.start(norm, dip)
+            earth.start(horizontal, vertical)
+        elif s.earth_gap:
+            earth.resume(horizontal, vertical)
+        s.earth_gap = False
         interval_state = s.interval
         rate2 = (
             interval_state.rate_x * interval_state.rate_x
             + interval_state.rate_y * interval_state.rate_y
             + interval_state.rate_z * interval_state.rate_z
         )
-        weight = earth.weight(norm, dip, dt, rate2)
+        weight = earth.weight(horizontal, vertical, dt, rate2)
+        if not weight > 0.0:
+            return
         if not s.heading.known:
             s.started = True
             self._heading.start(east / horizontal, north / horizontal, dt)
-        elif weight > 0.0:
+        else:
             self._heading.follow(east / horizontal, north / horizontal, dt, weight)
 
     def _restart(self, t: int) -> None:
@@ -452,7 +509,9 @@ class AdaptiveFilter:
         s = self.state
         self._flag_gap()
         s.held.count = 0
-        s.time_ns = t
+        s.time_ns = s.start_ns = s.first_ns = s.newest_ns = t
+        s.ahead = False
+        s.earth_gap = True
         s.tilt.known = False
         s.heading.known = False
         s.has_acc = False

@@ -1,16 +1,19 @@
 cimport cython
 
+cdef extern from "math.h":
+    cpdef double sqrt(double x)
+
 @cython.final
 cdef class FieldState:
     cdef public bint known
-    cdef public double norm
-    cdef public double dip
+    cdef public double horizontal
+    cdef public double vertical
     cdef public double reference_age_s
-    cdef public double reference_norm
-    cdef public double reference_dip
+    cdef public double reference_horizontal
+    cdef public double reference_vertical
     cdef public double candidate_age_s
-    cdef public double candidate_norm
-    cdef public double candidate_dip
+    cdef public double candidate_horizontal
+    cdef public double candidate_vertical
     cdef public double good_s
     cdef public double rejected_s
     cdef public bint disturbed
@@ -19,7 +22,7 @@ cdef class FieldState:
 cdef class FieldGate:
     cdef readonly FieldState state
     cdef double _norm_tolerance
-    cdef double _dip_tolerance
+    cdef double _dip_cosine
     cdef double _mean_s
     cdef double _settle_s
     cdef double _reference_s
@@ -28,6 +31,8 @@ cdef class FieldGate:
     cdef double _patience_s
     cdef double _late_weight
 
-    cpdef void start(self, double norm, double dip) noexcept
-    cpdef double weight(self, double norm, double dip, double dt, double rate2) noexcept
+    cpdef void start(self, double horizontal, double vertical) noexcept
+    cpdef void resume(self, double horizontal, double vertical) noexcept
+    cpdef double weight(self, double horizontal, double vertical, double dt, double rate2) noexcept
+    cdef bint _alike(self, double horizontal, double vertical) noexcept
     cdef void _try_candidate(self, double dt, double rate2) noexcept

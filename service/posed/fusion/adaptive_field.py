@@ -1,7 +1,11 @@
-"""Is the magnetic field the earth's: its norm and dip against a reference that is learnt."""
+"""Is the magnetic field the earth's: its norm and dip against a reference that is learnt.
+
+Fields are pairs of their horizontal and vertical part (uT, the vertical one up): the dips of two of them differ by the
+angle between the pairs, so their products say whether it is within tolerance, and no angle is ever formed.
+"""
 
 from dataclasses import dataclass
-from math import radians
+from math import cos, pi, radians, sqrt
 
 from posed.fusion.filter import require_positive
 
@@ -38,17 +42,17 @@ class FieldParams:
 
 @dataclass
 class FieldState:
-    """Mean, reference and candidate field (uT; dip in rad; seconds each was learnt from), and how it was judged."""
+    """Mean, reference and candidate field (uT; seconds each was learnt from), and how the mean was judged."""
 
     known: bool = False
-    norm: float = 0.0
-    dip: float = 0.0
+    horizontal: float = 0.0
+    vertical: float = 0.0
     reference_age_s: float = 0.0
-    reference_norm: float = 0.0
-    reference_dip: float = 0.0
+    reference_horizontal: float = 0.0
+    reference_vertical: float = 0.0
     candidate_age_s: float = 0.0
-    candidate_norm: float = 0.0
-    candidate_dip: float = 0.0
+    candidate_horizontal: float = 0.0
+    candidate_vertical: float = 0.0
     good_s: float = 0.0
     rejected_s: float = 0.0
     disturbed: bool = False
@@ -60,7 +64,7 @@ class FieldGate:
     def __init__(self, params: FieldParams, state: FieldState) -> None:
         self.state = state
         self._norm_tolerance = params.norm_tolerance
-        self._dip_tolerance = params.dip_tolerance
+        self._dip_cosine = cos(min(params.dip_tolerance, pi))
         self._mean_s = params.mean_s
         self._settle_s = params.settle_s
         self._reference_s = params.reference_s
@@ -69,36 +73,39 @@ class FieldGate:
         self._patience_s = params.patience_s
         self._late_weight = params.late_weight
 
-    def start(self, norm: float, dip: float) -> None:
-        """Take this field (uT, rad) as the reference: the first there is, or the first after a gap."""
+    def start(self, horizontal: float, vertical: float) -> None:
+        """Take this field (uT) as the reference: the first there is."""
         s = self.state
         s.known = True
-        s.norm = s.reference_norm = s.candidate_norm = norm
-        s.dip = s.reference_dip = s.candidate_dip = dip
+        s.horizontal = s.reference_horizontal = s.candidate_horizontal = horizontal
+        s.vertical = s.reference_vertical = s.candidate_vertical = vertical
         s.reference_age_s = s.candidate_age_s = s.rejected_s = 0.0
         s.good_s = self._settle_s
         s.disturbed = False
 
-    def weight(self, norm: float, dip: float, dt: float, rate2: float) -> float:
-        """Return the weight of a sample (uT, rad) that stands for `dt` s: 1 believed, 0 rejected.
+    def resume(self, horizontal: float, vertical: float) -> None:
+        """Begin the mean anew at this field (uT): the first after a gap is judged by itself."""
+        s = self.state
+        s.horizontal = horizontal
+        s.vertical = vertical
+
+    def weight(self, horizontal: float, vertical: float, dt: float, rate2: float) -> float:
+        """Return the weight of a sample (uT) that stands for `dt` s: 1 believed, 0 rejected.
 
         rate2: rad2/s2, the square of the rate at which the phone turns.
         """
         s = self.state
         gain = dt / (self._mean_s + dt)
-        s.norm += gain * (norm - s.norm)
-        s.dip += gain * (dip - s.dip)
-        if (
-            abs(s.norm - s.reference_norm) <= self._norm_tolerance * s.reference_norm
-            and abs(s.dip - s.reference_dip) <= self._dip_tolerance
-        ):
+        s.horizontal += gain * (horizontal - s.horizontal)
+        s.vertical += gain * (vertical - s.vertical)
+        if self._alike(s.reference_horizontal, s.reference_vertical):
             s.good_s += dt
             if s.good_s >= self._settle_s:
                 s.disturbed = False
                 s.reference_age_s += dt
                 gain = dt / min(s.reference_age_s, self._reference_s)
-                s.reference_norm += gain * (s.norm - s.reference_norm)
-                s.reference_dip += gain * (s.dip - s.reference_dip)
+                s.reference_horizontal += gain * (s.horizontal - s.reference_horizontal)
+                s.reference_vertical += gain * (s.vertical - s.reference_vertical)
         else:
             s.good_s = 0.0
             s.disturbed = True
@@ -112,24 +119,29 @@ class FieldGate:
             return 0.0
         return self._late_weight
 
+    def _alike(self, horizontal: float, vertical: float) -> bool:
+        """Return whether the mean is within tolerance of this field (uT)."""
+        s = self.state
+        norm = sqrt(s.horizontal * s.horizontal + s.vertical * s.vertical)
+        known = sqrt(horizontal * horizontal + vertical * vertical)
+        along = s.horizontal * horizontal + s.vertical * vertical
+        return abs(norm - known) <= self._norm_tolerance * known and along >= self._dip_cosine * (norm * known)
+
     def _try_candidate(self, dt: float, rate2: float) -> None:
         s = self.state
-        if (
-            abs(s.norm - s.candidate_norm) > self._norm_tolerance * s.candidate_norm
-            or abs(s.dip - s.candidate_dip) > self._dip_tolerance
-        ):
+        if not self._alike(s.candidate_horizontal, s.candidate_vertical):
             s.candidate_age_s = 0.0
-            s.candidate_norm = s.norm
-            s.candidate_dip = s.dip
+            s.candidate_horizontal = s.horizontal
+            s.candidate_vertical = s.vertical
             return
         gain = dt / min(s.candidate_age_s + dt, self._reference_s)
-        s.candidate_norm += gain * (s.norm - s.candidate_norm)
-        s.candidate_dip += gain * (s.dip - s.candidate_dip)
+        s.candidate_horizontal += gain * (s.horizontal - s.candidate_horizontal)
+        s.candidate_vertical += gain * (s.vertical - s.candidate_vertical)
         if rate2 > self._candidate_rate2:
             s.candidate_age_s += dt
             if s.candidate_age_s >= self._candidate_s:
-                s.reference_norm = s.candidate_norm
-                s.reference_dip = s.candidate_dip
+                s.reference_horizontal = s.candidate_horizontal
+                s.reference_vertical = s.candidate_vertical
                 s.reference_age_s = s.candidate_age_s
                 s.candidate_age_s = 0.0
                 s.good_s = self._settle_s

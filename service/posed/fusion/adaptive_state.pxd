@@ -18,25 +18,33 @@ cdef class AdaptiveState:
     cdef public long long time_ns
     cdef public long long start_ns
     cdef public long long first_ns
+    cdef public long long newest_ns
+    cdef public bint ahead
     cdef public bint has_gyro
     cdef public long long gyro_ns
-    cdef public long long gyro_changed_ns
+    cdef public long long gyro_same
+    cdef public double gyro_same_s
     cdef public double gyro_x
     cdef public double gyro_y
     cdef public double gyro_z
     cdef public bint gyro_lost
     cdef public bint has_acc
     cdef public long long acc_ns
-    cdef public long long acc_changed_ns
+    cdef public long long acc_used_ns
+    cdef public long long acc_same
+    cdef public double acc_same_s
     cdef public double acc_x
     cdef public double acc_y
     cdef public double acc_z
     cdef public bint has_mag
     cdef public long long mag_ns
-    cdef public long long mag_changed_ns
+    cdef public long long mag_used_ns
+    cdef public long long mag_same
+    cdef public double mag_same_s
     cdef public double mag_x
     cdef public double mag_y
     cdef public double mag_z
+    cdef public bint earth_gap
     cdef public bint free_fall
     cdef public long long events
     cdef public long long bad_samples

@@ -1,7 +1,9 @@
 """What the adaptive DCM filter is told (AdaptiveParams) and all that it remembers (AdaptiveState)."""
 
 from dataclasses import dataclass, field
+from math import isfinite
 
+from posed.errors import InvalidArgumentError
 from posed.fusion.adaptive_bias import BiasParams, BiasState
 from posed.fusion.adaptive_field import FieldParams, FieldState
 from posed.fusion.adaptive_heading import HeadingParams, HeadingState
@@ -11,6 +13,9 @@ from posed.fusion.adaptive_tilt import TiltParams, TiltState
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.held import HeldEvents
 from posed.fusion.rest import RestParams, RestState
+
+_MAX_DELAY_S = 0.1
+"""A measurement later than this is given up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +42,23 @@ class AdaptiveParams:
     """s, the same for the accelerometer."""
     mag_delay_s: float = 0.008
     """s, the same for the magnetometer. AK8963: a conversion takes 7 ms."""
+    gyro_range: float = 35.0
+    """rad/s a component can reach: beyond is a spike, at it the part is saturated. 2000 degrees/s, the widest of phone
+    parts, is 34.9."""
     use_gyroscope: bool = True
     """False takes none, as Android's geomagnetic rotation vector."""
     use_magnetometer: bool = True
     """False takes none, as Android's game rotation vector: north is where the phone faced at the start."""
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.gyro_range) and self.gyro_range > 0.0):
+            raise InvalidArgumentError(f"AdaptiveParams.gyro_range is {self.gyro_range}; give a finite number above 0")
+        for name in ("gyro_delay_s", "acc_delay_s", "mag_delay_s"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= _MAX_DELAY_S:
+                raise InvalidArgumentError(
+                    f"AdaptiveParams.{name} is {value}; give seconds from 0 to {_MAX_DELAY_S}, usually thousandths"
+                )
 
 
 @dataclass
@@ -48,7 +66,9 @@ class AdaptiveState:
     """All that the filter remembers; equal states continue alike, bit for bit.
 
     matrix turns device vectors into the levelled frame, which has a heading of its own, at start_ns: the start of the
-    newest gyroscope interval. Times in ns, each valid only with its flag. held: measurements that wait for theirs.
+    newest gyroscope interval. Times in ns, each valid only with its flag; of `acc_ns` and `mag_ns` the newest sample,
+    of `acc_used_ns` and `mag_used_ns` the newest not refused. `*_same`: samples that repeated the sensor's last value,
+    `*_same_s`: s of motion since that value came. held: measurements that wait for theirs.
     """
 
     matrix: DirectionCosines = field(default_factory=DirectionCosines)
@@ -58,25 +78,36 @@ class AdaptiveState:
     """Newest gyroscope sample, or measurement while the gyroscope is lost."""
     start_ns: int = 0
     first_ns: int = 0
+    """First event, or first after a gap."""
+    newest_ns: int = 0
+    """Newest stamp of all sensors that was believed; `ahead` while one far beyond it waits for a second to agree."""
+    ahead: bool = False
     has_gyro: bool = False
     gyro_ns: int = 0
-    gyro_changed_ns: int = 0
+    gyro_same: int = 0
+    gyro_same_s: float = 0.0
     gyro_x: float = 0.0
     gyro_y: float = 0.0
     gyro_z: float = 0.0
     gyro_lost: bool = False
     has_acc: bool = False
     acc_ns: int = 0
-    acc_changed_ns: int = 0
+    acc_used_ns: int = 0
+    acc_same: int = 0
+    acc_same_s: float = 0.0
     acc_x: float = 0.0
     acc_y: float = 0.0
     acc_z: float = 0.0
     has_mag: bool = False
     mag_ns: int = 0
-    mag_changed_ns: int = 0
+    mag_used_ns: int = 0
+    mag_same: int = 0
+    mag_same_s: float = 0.0
     mag_x: float = 0.0
     mag_y: float = 0.0
     mag_z: float = 0.0
+    earth_gap: bool = False
+    """No field has been judged since a gap."""
     free_fall: bool = False
     events: int = 0
     bad_samples: int = 0

@@ -110,6 +110,12 @@ class DcmFilter:
         rate = (s.rate_x, s.rate_y, s.rate_z)
         return Orientation(s.time_ns, s.matrix.quaternion(), rate, accuracy, FilterStatus(status))
 
+    def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return the bias learnt at rest and its standard deviations, rad/s in device axes."""
+        rest = self.state.rest
+        std = sqrt(rest.bias_variance)
+        return (rest.bias_x, rest.bias_y, rest.bias_z), (std, std, std)
+
     def clear_events(self) -> None:
         """Forget GAP and BAD_SAMPLE; their counts stay."""
         self.state.events = 0

@@ -48,6 +48,9 @@ class OrientationFilter(Protocol):
         While the gyroscope is lost it stands at the newest measurement instead. Asking changes nothing.
         """
 
+    def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return the gyroscope's bias and its standard deviations, rad/s in device axes; NaN for deviations unknown."""
+
     def clear_events(self) -> None:
         """Forget the flags that speak of what happened since the last pose (GAP, BAD_SAMPLE); call at each pose."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from posed.errors import InvalidStateError, MissingExtraError
 from posed.events import STANDARD_GRAVITY, FilterStatus, FlatEvent, Float64Array, SensorType
 from posed.fusion.filter import SensorNoise
-from posed.fusion.paced import PacedFilter, Periods
+from posed.fusion.paced import UNKNOWN_BIAS, PacedFilter, Periods
 
 try:
     import imufusion
@@ -51,6 +51,13 @@ class ImufusionFilter(PacedFilter):
         samples = zip(np.degrees(rate), acceleration / STANDARD_GRAVITY, field, strict=True)
         for rate_deg_s, acceleration_g, field_ut in samples:
             update(correct(rate_deg_s), acceleration_g, field_ut)
+
+    def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return the offset that Fusion takes off, rad/s; it states no deviations: NaN."""
+        if self._bias is None:
+            return UNKNOWN_BIAS
+        x, y, z = (radians(each) for each in self._bias.get_offset().tolist())
+        return (x, y, z), UNKNOWN_BIAS[1]
 
     def save(self) -> dict[str, Any]:
         """Raise InvalidStateError: the state cannot be read."""

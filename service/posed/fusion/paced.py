@@ -10,7 +10,7 @@ millisecond before a slow gyroscope's would otherwise act on an orientation one 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from math import pi, sqrt
+from math import nan, pi, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
@@ -22,6 +22,9 @@ _GYROSCOPE = int(SensorType.GYROSCOPE)
 
 UNKNOWN_HEADING = pi / sqrt(3.0)
 """rad, one sigma of a heading uniform over the circle: the packages state no accuracy."""
+
+UNKNOWN_BIAS = ((0.0, 0.0, 0.0), (nan, nan, nan))
+"""What `gyro_bias` says before there is a filter to ask."""
 
 _LONGEST_HOLD_NS = 500_000_000
 _STRETCH_NS = 1_000_000_000
@@ -82,6 +85,13 @@ class PacedFilter(ABC):
     @abstractmethod
     def _answer(self) -> tuple[tuple[float, ...], tuple[float, ...], FilterStatus]:
         """Return the quaternion (w, x, y, z), device to ENU, the gyroscope's bias (rad/s) and the status."""
+
+    @abstractmethod
+    def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return the gyroscope's bias and its standard deviations, rad/s in device axes.
+
+        Zero with NaN before the filter has begun; NaN for deviations that a package does not state.
+        """
 
     @abstractmethod
     def update_synchronous(

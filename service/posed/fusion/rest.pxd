@@ -12,6 +12,7 @@ cdef class RestState:
     cdef public double acceleration_x
     cdef public double acceleration_y
     cdef public double acceleration_z
+    cdef public bint shaken
     cdef public double bias_x
     cdef public double bias_y
     cdef public double bias_z
@@ -31,5 +32,6 @@ cdef class RestBias:
     cdef double _rest_noise
 
     cpdef void take_rate(self, double x, double y, double z, double dt) noexcept
+    @cython.locals(first=bint)
     cpdef void take_acceleration(self, double x, double y, double z, double dt) noexcept
     cpdef void moved(self) noexcept

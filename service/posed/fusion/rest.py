@@ -54,6 +54,8 @@ class RestState:
     acceleration_x: float = 0.0
     acceleration_y: float = 0.0
     acceleration_z: float = 0.0
+    shaken: bool = False
+    """The last accelerometer sample was motion."""
     bias_x: float = 0.0
     bias_y: float = 0.0
     bias_z: float = 0.0
@@ -110,7 +112,8 @@ class RestBias:
     def take_acceleration(self, x: float, y: float, z: float, dt: float) -> None:
         """Take an accelerometer sample (m/s2) that stands for the last `dt` > 0 seconds."""
         s = self.state
-        gain = dt / (self._mean_s + dt) if s.has_acceleration else 1.0
+        first = not s.has_acceleration
+        gain = 1.0 if first else dt / (self._mean_s + dt)
         s.has_acceleration = True
         dx = x - s.acceleration_x
         dy = y - s.acceleration_y
@@ -118,7 +121,9 @@ class RestBias:
         s.acceleration_x += gain * dx
         s.acceleration_y += gain * dy
         s.acceleration_z += gain * dz
+        s.shaken = False
         if dx * dx + dy * dy + dz * dz > self._acceleration_deviation2:
+            s.shaken = not first
             self.moved()
 
     def moved(self) -> None:

@@ -6,9 +6,14 @@ from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar, cast
 
 from posed.errors import InvalidArgumentError
+from posed.events import SensorType
 from posed.fusion.held import MAX_HELD, HeldEvents
 
 _T = TypeVar("_T")
+
+_MAX_INTEGER = 2**62
+"""Compiled states hold 64 bits, and subtract times in them."""
+_HELD_TYPES = (int(SensorType.ACCELEROMETER), int(SensorType.MAGNETIC_FIELD))
 
 
 def plain(value: Any) -> Any:
@@ -43,20 +48,29 @@ def filled(kind: type[_T], saved: Any, path: str) -> _T:
 
 def _held(saved: Any, path: str) -> HeldEvents:
     blank = (0, 0, 0.0, 0.0, 0.0)
-    if not isinstance(saved, list) or len(saved) > MAX_HELD:
+    if not isinstance(saved, list) or len(saved) >= MAX_HELD:
+        # A filter never ends an update with as many: the next event would find no room.
         raise _misfit(path, saved)
     held = HeldEvents()
     for event in saved:
         if not isinstance(event, list) or len(event) != len(blank) or not all(map(_fits, event, blank)):
             raise _misfit(path, event)
         sensor_type, timestamp_ns, x, y, z = event
+        if sensor_type not in _HELD_TYPES:
+            raise _misfit(path, event)
         held.add(sensor_type, timestamp_ns, x, y, z)
     return held
 
 
 def _fits(value: Any, default: Any) -> bool:
-    return type(value) is type(default) and (not isinstance(value, float) or math.isfinite(value))
+    if type(value) is not type(default):
+        return False
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return not isinstance(value, int) or abs(value) < _MAX_INTEGER
 
 
 def _misfit(path: str, value: Any) -> InvalidArgumentError:
-    return InvalidArgumentError(f"the saved {path} is {value!r}, which is no state of this filter; start it afresh")
+    return InvalidArgumentError(
+        f"the saved {path} is {value!r:.100}, which is no state of this filter; start it afresh"
+    )

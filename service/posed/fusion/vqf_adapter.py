@@ -9,7 +9,7 @@ import numpy as np
 from posed.errors import InvalidArgumentError, MissingExtraError
 from posed.events import FilterStatus, FlatEvent, Float64Array, SensorType
 from posed.fusion.filter import SensorNoise
-from posed.fusion.paced import PacedFilter, Periods
+from posed.fusion.paced import UNKNOWN_BIAS, PacedFilter, Periods
 
 try:
     from vqf import VQF
@@ -36,6 +36,13 @@ class VqfFilter(PacedFilter):
     ) -> None:
         """Take whole arrays in one call, as VQF's compiled batch form does."""
         VQF(period_s).updateBatch(rate, acceleration, field)
+
+    def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return VQF's bias and its deviations, rad/s: the largest of the three stands for all, as VQF states it."""
+        if self._vqf is None:
+            return UNKNOWN_BIAS
+        (x, y, z), std = self._vqf.getBiasEstimate()
+        return (float(x), float(y), float(z)), (float(std), float(std), float(std))
 
     def save(self) -> dict[str, Any]:
         """Return the state of VQF and of what is held for it, as values that JSON can hold."""

@@ -3,7 +3,10 @@
 import { format, formatBearing } from "./angles.js";
 import { formatDistance } from "./draw.js";
 
-const STATUS = ["initialising", "at rest", "magnetic disturbance", "gyroscope lost", "free fall", "gap", "bad sample"];
+const STATUS = [
+  "initialising", "at rest", "magnetic disturbance", "gyroscope lost", "free fall", "gap", "bad sample", "heading free",
+  "accelerometer lost",
+];
 const WORRYING = 0b1111001 & ~0b10;
 const SAY_EVERY_MS = 3000;
 const STEADY_MS = 700;
