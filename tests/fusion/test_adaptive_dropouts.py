@@ -16,7 +16,7 @@ FROM_S, UNTIL_S, END_S = 20.0, 30.0, 60.0
 NONE = FilterStatus.OK
 GAP, BAD = FilterStatus.GAP, FilterStatus.BAD_SAMPLE
 FREE, ACC_LOST = FilterStatus.HEADING_FREE, FilterStatus.ACCELEROMETER_LOST
-RANGES = {ACC: 19.6, GYRO: 0.35, MAG: 30.0}
+RANGES = {ACC: 7.0, GYRO: 0.35, MAG: 30.0}
 """What a saturated sensor stops at: in the middle of what it reads here."""
 
 
@@ -94,7 +94,7 @@ EXPECTED: dict[tuple[SensorType, Fault], tuple[float, FilterStatus, FilterStatus
     (ACC, Fault.LOST): (1.0, ACC_LOST, ACC_LOST),
     (ACC, Fault.SPIKED): (1.0, NONE, NONE),
     (ACC, Fault.STUCK): (1.0, BAD | ACC_LOST, BAD | ACC_LOST),
-    (ACC, Fault.SATURATED): (1.0, NONE, NONE),
+    (ACC, Fault.SATURATED): (2.0, NONE, NONE),
     (ACC, Fault.NOT_A_NUMBER): (1.0, BAD, BAD),
     (ACC, Fault.REORDERED): (1.0, NONE, GAP),
     (ACC, Fault.DUPLICATED): (1.0, GAP, GAP),
