@@ -29,6 +29,7 @@ cdef double _STUCK_S
 cdef long long _STUCK_SAMPLES
 cdef Py_ssize_t _MAX_HELD
 cdef double _MIN_ACCELERATION2
+cdef double _UNSTEADY
 cdef double _MAX_MEASUREMENT2
 cdef double _MIN_HORIZONTAL2
 
@@ -76,7 +77,7 @@ cdef class AdaptiveFilter:
     cdef void _measure_alone(self, long long sensor_type, long long t, double x, double y, double z) noexcept
     cdef void _measure(self, long long sensor_type, long long t, double x, double y, double z, double u) noexcept
     @cython.locals(
-        s=AdaptiveState, c=DirectionCosines, tilt=TiltState, rest=RestState, interval=GyroInterval, dt=double,
+        s=AdaptiveState, c=DirectionCosines, tilt=TiltState, rest=RestState, interval=GyroInterval, dt=double, norm2=double, change=double,
         east_x=double, east_y=double, east_z=double, levelled=bint,
     )
     cdef void _measure_gravity(self, long long t, double x, double y, double z, double u) noexcept

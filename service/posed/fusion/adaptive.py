@@ -54,6 +54,9 @@ _STUCK_S = 0.5
 _STUCK_SAMPLES = 8
 """Values that stay the same to the last bit for so long in motion, and so often, are those of a sensor that hangs. In
 motion only: noise below the last bit repeats itself on a table, and at NORMAL half a second is two samples."""
+_UNSTEADY = 0.1
+"""Of the acceleration's squared norm, (m/s2)2: noise of 0.005 m/s2. A stream without any, as one writes it by hand, may
+well hold the same rate for seconds."""
 _MAX_LATE_NS = 100_000_000
 """Before the newest interval the rate is taken to run on as it begins, which holds no longer than this."""
 _FREE_NS = 1_000_000_000
@@ -256,7 +259,7 @@ class AdaptiveFilter:
                 self._flag_bad_sample()
                 return
             # Exactly zero is what a simulated phone reads that is moved without being turned.
-            if turning or (s.rest.shaken and norm2 > 0.0):
+            if s.unsteady and (turning or (s.rest.shaken and norm2 > 0.0)):
                 s.gyro_same_s += dt
         if turning:
             c = s.matrix
@@ -364,6 +367,9 @@ class AdaptiveFilter:
                 self._flag_gap()
                 return
             dt = min((t - s.acc_ns) * 1e-9, _MAX_STEP_S)
+        norm2 = x * x + y * y + z * z
+        change = norm2 - (s.acc_x * s.acc_x + s.acc_y * s.acc_y + s.acc_z * s.acc_z)
+        s.unsteady = s.has_acc and (change > _UNSTEADY or change < -_UNSTEADY)
         if x != s.acc_x or y != s.acc_y or z != s.acc_z or not s.has_acc:
             s.acc_same = 0
             s.acc_same_s = 0.0
@@ -374,7 +380,7 @@ class AdaptiveFilter:
             s.acc_same += 1
         s.has_acc = True
         s.acc_ns = t
-        s.free_fall = x * x + y * y + z * z < _MIN_ACCELERATION2
+        s.free_fall = norm2 < _MIN_ACCELERATION2
         if s.free_fall:
             s.acc_used_ns = t
             self._rest.moved()

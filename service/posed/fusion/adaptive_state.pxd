@@ -24,6 +24,7 @@ cdef class AdaptiveState:
     cdef public long long gyro_ns
     cdef public long long gyro_same
     cdef public double gyro_same_s
+    cdef public bint unsteady
     cdef public double gyro_x
     cdef public double gyro_y
     cdef public double gyro_z

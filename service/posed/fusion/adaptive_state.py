@@ -86,6 +86,8 @@ class AdaptiveState:
     gyro_ns: int = 0
     gyro_same: int = 0
     gyro_same_s: float = 0.0
+    unsteady: bool = False
+    """The newest acceleration differs from the one before by more than rounding: the stream has noise, or shakes."""
     gyro_x: float = 0.0
     gyro_y: float = 0.0
     gyro_z: float = 0.0
