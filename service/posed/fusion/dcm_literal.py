@@ -13,11 +13,12 @@ Read into the letter only where it cannot run:
 - Eq. 7 equates m/s2 with cosines: the sample is divided by its norm ("normalized components"), and so is its noise;
 - Eq. 11, 13, 15: the measured column is Eq. 1's first, whose tilt is that of row 3; the magnetometer's noise by the
   covariance law is that of a sample over the horizontal field;
-- Eq. 16-18 throw away the third row, which alone the accelerometer corrects: for them to follow a correction as well
-  costs all of it (65 deg over four of BROAD's recordings). The text has them for the process model and Eq. 1 for the
-  measurement model, so a correction ends with Eq. 1: roll and pitch of row 3, heading of its column;
+- Eq. 16-18 throw away the third row, which alone the accelerometer corrects: with nothing else, little of a correction
+  outlives the next gyroscope sample (65 deg over four of BROAD's recordings, with the parts' variances). The text has
+  them for the process model and Eq. 1 for the measurement model, so a correction ends with Eq. 1: roll and pitch of
+  row 3, heading of its column;
 - the variances are those of `dcm`, so that the equations are compared. The parts' alone, of which the paper speaks,
-  follow linear acceleration within a second (62 deg over the same four);
+  follow linear acceleration within a second (62 deg over the same four, Eq. 1 included);
 - when the heading column changes, its variances stay;
 - the start, and whatever happens while no gyroscope sample came for half a second, is Fig. 1's matrix.
 
