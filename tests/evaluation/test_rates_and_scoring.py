@@ -149,7 +149,9 @@ def test_the_poses_scored_are_those_that_a_daemon_publishes(trial: Trial, mode: 
     period_us = RateMode[mode].sampling_period_us
     published = {
         pose.instant_ns: pose.orientation.quaternion
-        for pose in fuse_recording(trial.recording, profile, sampling_period_us=period_us, aligned=aligned)
+        for pose in fuse_recording(
+            trial.recording, profile, sampling_period_us=period_us, filter_name="dcm", aligned=aligned
+        )
     }
     scored = {
         instant_ns: tuple(quaternion)
