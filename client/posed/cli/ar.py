@@ -95,11 +95,10 @@ def run(arguments: argparse.Namespace) -> int:
     corrections = CorrectionStore(arguments.corrections or default_path())
     corrections.load()  # better refused now than when the user saves one
     feed = ServiceFeed(arguments.mode, auto_create=not daemon_listens())
-    with listen(arguments.host, arguments.port) as bound:
+    # uvicorn shuts down in order at a signal and passes it on.
+    with contextlib.suppress(KeyboardInterrupt), listen(arguments.host, arguments.port) as bound:
         app = guarded(make_app(feed, content, corrections), bound, arguments.host, _tell_link)
-        # uvicorn shuts down in order at a signal and passes it on.
-        with contextlib.suppress(KeyboardInterrupt):
-            make_server(app).run(sockets=[bound])
+        make_server(app).run(sockets=[bound])
     return 0
 
 

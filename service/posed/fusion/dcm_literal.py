@@ -26,7 +26,7 @@ The raw accelerometer costs most: linear acceleration makes it choose an axis th
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, nan, pi, sin, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
@@ -97,6 +97,10 @@ class LiteralFilter:
             status |= FilterStatus.GYRO_LOST
         rate = (s.rate_x, s.rate_y, s.rate_z)
         return Orientation(s.time_ns, _quaternion(s), rate, accuracy, FilterStatus(status))
+
+    def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """Return zeros: the paper leaves the bias to calibration, and how well that was done is not known (NaN)."""
+        return (0.0, 0.0, 0.0), (nan, nan, nan)
 
     def clear_events(self) -> None:
         """Forget GAP and BAD_SAMPLE; their counts stay."""
