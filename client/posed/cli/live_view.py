@@ -106,7 +106,7 @@ class LiveView:
         table.add_row(
             "poses", str(self._received), "missed", Text(str(self._missed), _DOUBTFUL if self._missed else "")
         )
-        table.add_row("rate mode", pose.rate_mode, "filter", f"{pose.filter}, {pose.events_fused} events a pose")
+        table.add_row("rate mode", pose.rate_mode, "filter", f"{pose.filter}, {pose.events_fused} events")
         table.add_row(
             "heading", f"±{math.degrees(pose.heading_accuracy):.1f}° (1 sigma)", "sequence", str(pose.sequence)
         )
