@@ -107,7 +107,7 @@ def pose_message(pose: Pose) -> dict[str, Any]:
     """Return what `p` holds."""
     return {
         "n": pose.sequence,
-        "t": _ms(pose.delivery.to_boot_ns(pose.timestamp_ns)),
+        "t": _ms(pose.delivery.to_boot_ns(pose.timestamp_ns + pose.predicted_ns)),
         "b": _ms(pose.delivery.published_ns),
         "q": [round(q, 6) for q in pose.quaternion],
         "w": [round(w, 4) for w in pose.angular_rate],

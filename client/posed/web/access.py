@@ -79,7 +79,8 @@ class Access:
         self._sessions = [*self._sessions[1 - _MAX_SESSIONS :], session]
         self._renew_token()
         response = RedirectResponse("/", status_code=303)
-        response.set_cookie(self._cookie, session, httponly=True, samesite="strict")
+        # Not strict: a link clicked on another site's page would be spent, and the browser not let in.
+        response.set_cookie(self._cookie, session, httponly=True, samesite="lax")
         return response
 
     def _has_session(self, headers: Headers) -> bool:

@@ -7,7 +7,8 @@ const STATUS = [
   "initialising", "at rest", "magnetic disturbance", "gyroscope lost", "free fall", "gap", "bad sample", "heading free",
   "accelerometer lost",
 ];
-const WORRYING = 0b1111001 & ~0b10;
+// All but "at rest".
+const WORRYING = 0b111111101;
 const SAY_EVERY_MS = 3000;
 const STEADY_MS = 700;
 
