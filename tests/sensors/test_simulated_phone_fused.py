@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -86,3 +87,34 @@ def test_changing_the_mode_live_takes_effect_within_a_second_and_makes_no_headin
         events = sum(pose.events_fused for pose in settled) / 4
         assert events == pytest.approx({"NORMAL": 25, "UI": 45, "GAME": 150, "FASTEST": 350}[mode.name], rel=0.05)
         before = settled[-1]
+
+
+def test_a_replay_bound_again_after_a_pause_has_its_first_pose_at_once(tmp_path: Path) -> None:
+    recording = tmp_path / "still.csv"
+    rows = [
+        (sensor, at_ms * 1_000_000, values)
+        for at_ms in range(0, 10_000, 20)
+        for sensor, values in (
+            ("accelerometer", (0.0, 0.0, 9.81)),
+            ("gyroscope", (0.0, 0.0, 0.0)),
+            ("magnetic_field", (0.0, 22.0, -43.0)),
+        )
+    ]
+    lines = (f"{sensor},{at_ns},{','.join(map(str, values))}\n" for sensor, at_ns, values in rows)
+    recording.write_text("sensor,timestamp_ns,x,y,z\n" + "".join(lines))
+    clock = VirtualClock(1_000_000_000)
+    profile = load_profile("patonis2018")
+    source = open_source(f"replay:{recording}", profile, clock)
+    service = SensorService(source, make_device_filter("dcm", profile), clock)
+
+    def poses_of(milliseconds: int) -> list[int]:
+        clock.advance_to(clock.now_ns() + milliseconds * 1_000_000)
+        service.advance()
+        return [pose.sequence for pose in service.take_poses()]
+
+    service.register_pose("first", 100_000, 0)
+    assert poses_of(1050) == list(range(11))
+    service.unregister_pose("first")
+    assert poses_of(60_000) == []
+    service.register_pose("second", 100_000, 0)
+    assert poses_of(200) == [11, 12]

@@ -86,7 +86,7 @@ class ReplaySource:
         self._untouched: set[int] = set()
         """Sensors that have not been switched since the replay began to run, while nothing has been drained since."""
         self._drained_ns = recording.start_ns - 1
-        self._time_map = self._standing_at(recording.start_ns)
+        self._time_map = self.time_map
 
     @property
     def sensors(self) -> tuple[SensorInfo, ...]:
@@ -95,8 +95,8 @@ class ReplaySource:
 
     @property
     def time_map(self) -> TimeMap:
-        """The mapping from sample time to CLOCK_BOOTTIME; while paused, that of the run before."""
-        return self._time_map
+        """The mapping from sample time to CLOCK_BOOTTIME; while paused, sample time stands still at the clock's now."""
+        return self._time_map if self._active else self._standing_at(self._drained_ns + 1)
 
     @property
     def end_ns(self) -> int | None:
@@ -115,7 +115,7 @@ class ReplaySource:
             if not stream.is_configured:
                 stream.configure(0)
             if not self._active:
-                self._time_map = self._standing_at(self._drained_ns + 1)
+                self._time_map = self.time_map
                 self._untouched = set(self._streams)
             # Sensors switched on one after another, before anything was drained, all begin where the run began:
             # what a replay yields then does not depend on how fast its user was.
