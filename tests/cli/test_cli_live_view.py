@@ -54,6 +54,26 @@ def test_poses_in_the_picture() -> None:
         assert words in text
 
 
+def test_a_flat_phone_has_no_camera_heading_and_no_angle_a_negative_zero() -> None:
+    flat = dataclasses.replace(_pose(1), quaternion=(0.0, 1e-5, 0.0, 1.0))
+    view = LiveView()
+    view.add(flat)
+    for text in (_drawn(view, ServiceState.CONNECTED, _SECOND), pose_line(flat)):
+        assert "down" in text
+        assert "-0.0" not in text
+    turned_over = dataclasses.replace(flat, quaternion=(0.0, -1.0, 0.0, 1e-5))
+    assert "roll  180.0  camera    up" in pose_line(turned_over)
+
+
+def test_an_ended_recording_is_said_in_the_picture_until_another_daemon_comes() -> None:
+    view = LiveView()
+    view.add(_pose(1))
+    view.note_end("it is over")
+    assert "it is over" in _drawn(view, ServiceState.CONNECTED, 3 * _SECOND)
+    view.count_connection()
+    assert "no pose for 3 s" in _drawn(view, ServiceState.CONNECTED, 3 * _SECOND)
+
+
 @pytest.mark.parametrize("width", [30, 60, 80, 120])
 def test_the_picture_keeps_to_the_terminal(width: int) -> None:
     view = LiveView()

@@ -7,6 +7,7 @@ import pty
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from cli_shell import Shell
@@ -80,6 +81,28 @@ def test_ctrl_c_ends_a_stream_in_good_order(shell: Shell, command: list[str]) ->
     stream = shell.begin(*command)
     assert stream.stdout is not None
     assert stream.stdout.readline()
+    assert shell.end(stream, signal.SIGINT) == (0, "")
+
+
+def test_sigterm_ends_events_with_its_code(shell: Shell) -> None:
+    shell.run("start")
+    stream = shell.begin("events", "accelerometer")
+    assert stream.stdout is not None
+    assert stream.stdout.readline()
+    assert shell.end(stream, signal.SIGTERM) == (128 + signal.SIGTERM, "")
+
+
+@pytest.mark.parametrize("command", [["watch"], ["events", "gyroscope", "--rate=GAME"]])
+def test_a_stream_says_that_the_recording_has_ended(shell: Shell, tmp_path: Path, command: list[str]) -> None:
+    recording = tmp_path / "short.csv"
+    rows = ["accelerometer,{},0,0,9.81", "gyroscope,{},0,0,0", "magnetic_field,{},0,22,-43"]
+    lines = (row.format(at_ms * 1_000_000) for at_ms in range(0, 500, 20) for row in rows)
+    recording.write_text("sensor,timestamp_ns,x,y,z\n" + "\n".join(lines) + "\n")
+    shell.run("start", f"--source=replay:{recording}")
+    stream = shell.begin(*command)
+    assert stream.stderr is not None
+    while "the recording has ended" not in (said := stream.stderr.readline()):
+        assert said
     assert shell.end(stream, signal.SIGINT) == (0, "")
 
 

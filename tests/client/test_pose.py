@@ -1,11 +1,14 @@
 """What follows from a pose's quaternion, against the values Android's formulas give."""
 
+import dataclasses
 import math
 
 import pytest
 
-from posed.client.pose import Delivery, Pose, PoseStatus
+from posed.client import PoseClient
+from posed.client.pose import Delivery, Pose, PoseStatus, boot_time_ns
 from posed.client.sensor import period_of_delay_us
+from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus
 from posed.proto import events_pb2, pose_pb2
 
@@ -93,3 +96,15 @@ def test_a_message_becomes_a_pose_with_nothing_lost() -> None:
 @pytest.mark.parametrize(("asked", "period_us"), [(0, 0), (1, 20_000), (2, 66_667), (3, 200_000), (4, 4), (-1, -1)])
 def test_rate_codes_become_periods_and_anything_else_is_one(asked: int, period_us: int) -> None:
     assert period_of_delay_us(asked) == period_us
+
+
+@pytest.mark.parametrize("pose_rate_hz", ["ten", None, 0.5, 201])
+def test_a_pose_rate_that_is_none_is_refused(pose_rate_hz: float) -> None:
+    with pytest.raises(InvalidArgumentError, match="is no rate"):
+        PoseClient(pose_rate_hz=pose_rate_hz)
+
+
+def test_the_age_of_a_pose_turned_on_counts_from_where_it_was_turned_to() -> None:
+    pose = _pose((0, 0, 0, 1), offset_ns=boot_time_ns())
+    turned_on = dataclasses.replace(pose, predicted_ns=2_000_000_000)
+    assert turned_on.age_s - pose.age_s == pytest.approx(-2.0, abs=1.0)

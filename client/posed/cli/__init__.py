@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         own = argparse.ArgumentParser(
             prog=f"posed {command}",
             description=f"{summary[0].upper()}{summary[1:]}.",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=_HelpFormatter,
             allow_abbrev=False,
         )
         module.add_arguments(own)
@@ -78,15 +78,27 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="posed",
-        description="A phone's sensor stack on a desk: Android's sensor service and a fused pose as a Linux daemon.",
+        description="A phone's sensor stack on a desk: Android's sensor service and\na fused pose as a Linux daemon.",
         epilog="'posed COMMAND --help' explains a command. To see it work: posed demo",
+        formatter_class=_HelpFormatter,
         allow_abbrev=False,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands", required=True)
     for name, (_, summary) in COMMANDS.items():
-        commands.add_parser(name, help=summary, add_help=False)
+        commands.add_parser(name, help=summary, add_help=False, formatter_class=_HelpFormatter)
     return parser
+
+
+class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Asks the terminal itself for its width: argparse asks shutil, whose archives cost the daemon 0.5 MB."""
+
+    def __init__(self, prog: str) -> None:
+        try:
+            columns = int(os.environ["COLUMNS"])
+        except (KeyError, ValueError):
+            columns = os.get_terminal_size(sys.stdout.fileno()).columns if sys.stdout.isatty() else 0
+        super().__init__(prog, width=(columns or 80) - 2)
 
 
 class _Version(argparse.Action):

@@ -15,8 +15,8 @@ from posed.binder.runtime import control_path, runtime_directory
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
 from posed.client.launcher import daemon_listens
 from posed.client.package import HIGH_SAMPLING_RATE_SENSORS, Package
-from posed.errors import ServiceUnavailableError
-from posed.proto import sensors_pb2, service_manager_pb2
+from posed.errors import PosedError, ServiceUnavailableError
+from posed.proto import binder_pb2, sensors_pb2, service_manager_pb2
 
 # Of a daemon that lives, connecting takes 2 ms; a stopped or hung one is not worth a longer wait.
 _TIMEOUT_S = 2.0
@@ -63,6 +63,15 @@ def sensor_service(connection: Connection) -> Proxy:
         service_manager_pb2.GetServiceRequest(name="sensorservice", interface=interface_of(descriptor).info)
     )
     return connection.proxy(descriptor, "sensorservice", _TIMEOUT_S)
+
+
+def source_has_ended() -> bool:
+    """Return True if the running daemon says that its source has given its last sample."""
+    try:
+        with connect() as connection:
+            return bool(sensor_service(connection).getStatistics(binder_pb2.Empty()).source_ended)
+    except PosedError:
+        return False  # it went meanwhile, which is told elsewhere
 
 
 def _await_connected(connection: Connection) -> None:

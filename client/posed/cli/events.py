@@ -10,7 +10,7 @@ import sys
 from posed.cli.connection import PACKAGE, require_daemon
 from posed.cli.options import RATE_MODES, positive_count
 from posed.cli.sensors import short_name, unit
-from posed.cli.watch import exit_on_signals
+from posed.cli.watch import SOURCE_ENDED, Silence, exit_on_signals
 from posed.client import SENSOR_STATUS_ACCURACY_HIGH, Sensor, SensorEvent, SensorManager, TriggerEvent
 from posed.client.sensor import period_of_delay_us
 from posed.errors import InvalidArgumentError, PosedError
@@ -123,6 +123,7 @@ class _Listener:
 def _print_events(listener: _Listener, count: int | None, as_json: bool) -> None:
     reader = select.poll()
     reader.register(sys.stdout, 0)
+    silence = Silence()
     printed = 0
     while printed != count:
         try:
@@ -130,7 +131,10 @@ def _print_events(listener: _Listener, count: int | None, as_json: bool) -> None
         except queue.Empty:
             if reader.poll(0):
                 return
+            if silence.is_the_end(False):
+                print(f"posed: {SOURCE_ENDED}", file=sys.stderr)
             continue
+        silence.is_the_end(True)
         print(event_json(event) if as_json else event_line(event), flush=True)
         printed += 1
 

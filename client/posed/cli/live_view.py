@@ -8,7 +8,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from posed.cli.pose_text import bearing_deg, status_words, wind
+from posed.cli.pose_text import angle_deg, bearing_deg, status_words, steep_camera, wind
 from posed.client import Pose, PoseStatus, Position, ServiceState
 from posed.client.pose_client import STALE_AFTER_NS
 
@@ -29,10 +29,12 @@ class LiveView:
         self._received = 0
         self._missed = 0
         self._published_ns: deque[int] = deque()
+        self._end = ""
 
     def count_connection(self) -> None:
         """Note that a daemon has connected: a second one is a return."""
         self._connections += 1
+        self._end = ""
 
     def add(self, pose: Pose) -> None:
         """Take in the next pose of the stream."""
@@ -45,6 +47,10 @@ class LiveView:
         self._published_ns.append(now_ns)
         while now_ns - self._published_ns[0] > _RATE_WINDOW_NS:
             self._published_ns.popleft()
+
+    def note_end(self, words: str) -> None:
+        """Say so where the poses stop."""
+        self._end = words
 
     def measured_hz(self) -> float | None:
         """Return the rate at which poses were published over the last 3 s, None before the second."""
@@ -82,6 +88,8 @@ class LiveView:
             if self._pose is None:
                 return _DOUBTFUL, "connected; waiting for the first pose"
             silent_ns = now_ns - self._pose.delivery.published_ns
+            if silent_ns > STALE_AFTER_NS and self._end:
+                return _DOUBTFUL, self._end
             if silent_ns > STALE_AFTER_NS:
                 return _DOUBTFUL, f"connected, but no pose for {silent_ns / 1e9:.0f} s"
             if self._connections > 1:
@@ -92,7 +100,7 @@ class LiveView:
 
     def _figures(self, pose: Pose, now_ns: int, live: bool) -> Table:
         hz = self.measured_hz()
-        age_ms = (now_ns - pose.delivery.to_boot_ns(pose.timestamp_ns)) / 1e6
+        age_ms = (now_ns - pose.delivery.to_boot_ns(pose.timestamp_ns + pose.predicted_ns)) / 1e6
         table = Table.grid(padding=(0, 1))
         for _ in range(2):
             table.add_column(style="dim", min_width=10, no_wrap=True)
@@ -133,9 +141,13 @@ def _attitude(pose: Pose, live: bool, gauge: int) -> Table:
     table.add_column(width=13, no_wrap=True)
     table.add_column(width=gauge, no_wrap=True)
     for label, heading in (("camera", pose.camera_heading), ("azimuth", pose.azimuth)):
-        table.add_row(label, f"{bearing_deg(heading):6.1f}° {wind(heading)}", tape(heading, gauge))
+        steep = steep_camera(pose) if label == "camera" else ""
+        if steep:
+            table.add_row(label, f"straight {steep}", "")
+        else:
+            table.add_row(label, f"{bearing_deg(heading):6.1f}° {wind(heading)}", tape(heading, gauge))
     for label, angle, limit in (("pitch", pose.pitch, math.pi / 2), ("roll", pose.roll, math.pi)):
-        table.add_row(label, f"{math.degrees(angle):+6.1f}°", bar(angle / limit, gauge))
+        table.add_row(label, f"{angle_deg(angle):+6.1f}°", bar(angle / limit, gauge))
     table.add_row()
     quaternion = "  ".join(f"{axis} {q:+.4f}" for axis, q in zip("xyzw", pose.quaternion, strict=True))
     rates = "  ".join(f"{axis} {math.degrees(w):+7.1f}" for axis, w in zip("xyz", pose.angular_rate, strict=True))

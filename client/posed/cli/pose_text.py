@@ -15,10 +15,11 @@ boot_id               of the daemon, new at every start, hexadecimal
 missed                poses of the stream lost just before this one
 quaternion            x, y, z, w, device to world (east, magnetic north, up)
 azimuth_rad, pitch_rad, roll_rad    as Android's getOrientation
-camera_heading_rad    of the back camera, 0 to 2 pi
+camera_heading_rad    of the back camera, 0 to 2 pi; means nothing where it looks straight up or down
 angular_rate_rad_s    x, y, z, device axes
 heading_accuracy_rad  one standard deviation
-status                list of initialising, at_rest, magnetic_disturbance, gyro_lost, free_fall, gap, bad_sample
+status                list of initialising, at_rest, magnetic_disturbance, gyro_lost, free_fall, gap, bad_sample,
+                      heading_free, accelerometer_lost
 rate_mode             in force: FASTEST, GAME, UI, NORMAL or CUSTOM
 events_fused          since the pose before
 filter                name of the orientation filter
@@ -26,6 +27,8 @@ position              null, or latitude_deg, longitude_deg, ellipsoidal_height_m
                       age_ns"""
 
 _FLAGS = tuple(PoseStatus)
+# Within 5 degrees of the vertical a heading says nothing.
+_STEEP = math.cos(math.radians(5.0))
 _WINDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 
 
@@ -60,8 +63,8 @@ def pose_line(pose: Pose) -> str:
     """Return a pose as one line for people, angles in degrees."""
     status = ", ".join(word.replace("_", " ") for word in status_words(pose.status))
     return (
-        f"{pose.sequence:6d}  azimuth {bearing_deg(pose.azimuth):5.1f}  pitch {math.degrees(pose.pitch):5.1f}"
-        f"  roll {math.degrees(pose.roll):6.1f}  camera {bearing_deg(pose.camera_heading):5.1f}"
+        f"{pose.sequence:6d}  azimuth {bearing_deg(pose.azimuth):5.1f}  pitch {angle_deg(pose.pitch):5.1f}"
+        f"  roll {angle_deg(pose.roll):6.1f}  camera {_camera(pose)}"
         f"  ±{math.degrees(pose.heading_accuracy):.1f}°  {status}".rstrip()
     )
 
@@ -76,6 +79,19 @@ def bearing_deg(heading: float) -> float:
     return round(math.degrees(heading), 1) % 360.0
 
 
+def angle_deg(angle: float) -> float:
+    """Return an angle (rad) in degrees that rounds to -179.9 to 180.0, without a negative zero."""
+    degrees = round(math.degrees(angle), 1) + 0.0
+    return 180.0 if degrees == -180.0 else degrees
+
+
+def steep_camera(pose: Pose) -> str:
+    """Return "up" or "down" if the back camera looks so steeply that it has no heading, else an empty string."""
+    x, y, _, _ = pose.quaternion
+    screen_up = 1.0 - 2.0 * (x * x + y * y)
+    return "" if abs(screen_up) < _STEEP else "down" if screen_up > 0.0 else "up"
+
+
 def wind(heading: float) -> str:
     """Return the nearest of the eight winds of a heading (rad), such as NE."""
     return _WINDS[round(math.degrees(heading) / 45.0) % 8]
@@ -84,6 +100,10 @@ def wind(heading: float) -> str:
 def finite_or_none(value: float) -> float | None:
     """Return the value, None in place of NaN and infinity, which JSON lacks."""
     return value if math.isfinite(value) else None
+
+
+def _camera(pose: Pose) -> str:
+    return f"{steep_camera(pose) or format(bearing_deg(pose.camera_heading), '.1f'):>5}"
 
 
 def _position_json(position: Position | None) -> dict[str, Any] | None:

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.live import Live
 
 import posed.client as sdk
+from posed.cli.connection import source_has_ended
 from posed.cli.live_view import LiveView, state_words
 from posed.cli.options import add_pose_rate_option, add_rate_mode_option, positive_count
 from posed.cli.pose_text import JSON_KEYS, pose_json, pose_line
@@ -19,6 +20,10 @@ from posed.client.pose import boot_time_ns
 
 # How often the view is drawn though nothing came, so that the age and the state stay true.
 _TICK_S = 0.25
+# After so many without anything it is asked whether there is more to come.
+_SILENT_TICKS = 4
+
+SOURCE_ENDED = "the recording has ended, so nothing more comes; --loop of 'posed serve' repeats it"
 # A frame takes 4 ms to draw; poses can come at 200 Hz.
 _FRAME_S = 0.1
 
@@ -56,6 +61,18 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+class Silence:
+    """Finds out, once, that nothing comes because the daemon's source has ended."""
+
+    def __init__(self) -> None:
+        self._ticks = 0
+
+    def is_the_end(self, heard: bool) -> bool:
+        """Return True if the source has ended and that was not known yet; asked at every tick and everything heard."""
+        self._ticks = 0 if heard else self._ticks + 1
+        return self._ticks == _SILENT_TICKS and source_has_ended()
+
+
 def exit_on_signals() -> None:
     """Have SIGTERM and SIGHUP unwind the stack, so that the terminal gets its cursor back and what was made goes."""
     for number in (signal.SIGTERM, signal.SIGHUP):
@@ -70,9 +87,12 @@ def draw_poses(client: PoseClient, view: LiveView, *, count: int | None = None, 
 
     with Live(console=Console(), auto_refresh=False) as live:
         next_frame = 0.0
+        silence = Silence()
         for pose in _poses(client, count, seconds):
             if pose is not None:
                 view.add(pose)
+            if silence.is_the_end(pose is not None):
+                view.note_end(SOURCE_ENDED)
             now = time.monotonic()
             if pose is None or now >= next_frame:
                 picture()
@@ -94,7 +114,10 @@ def print_poses(
     reader = select.poll()
     reader.register(sys.stdout, 0)
     told = ServiceState.CONNECTED
+    silence = Silence()
     for pose in _poses(client, count, seconds):
+        if silence.is_the_end(pose is not None):
+            print(f"posed: {SOURCE_ENDED}", file=sys.stderr)
         if client.state is not told:
             told = client.state
             print(f"posed: {state_words(told, client.reason)}", file=sys.stderr)

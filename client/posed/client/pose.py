@@ -156,8 +156,10 @@ class Pose:
 
     @property
     def age_s(self) -> float:
-        """Seconds from the newest sample in the pose to now, exact for live, simulated and replayed phones."""
-        return (boot_time_ns() - self.delivery.to_boot_ns(self.timestamp_ns)) / 1e9
+        """Seconds from the instant the pose is of, its newest sample or what it was turned on to, until now.
+
+        Exact for live, simulated and replayed phones."""
+        return (boot_time_ns() - self.delivery.to_boot_ns(self.timestamp_ns + self.predicted_ns)) / 1e9
 
     @property
     def rotation_matrix(self) -> tuple[float, ...]:
