@@ -123,6 +123,9 @@ class BenchPhone:
     def resume(self) -> None:
         self._phone.resume()
 
+    def prepare(self) -> None:
+        pass
+
     def next_sample_ns(self, handle: int) -> int | None:
         self._require_phone()
         if not self._is_part(handle):

@@ -184,6 +184,19 @@ class TestSource:
         assert len(stamps) == pytest.approx(200, abs=1)
         assert stamps[0] > START + 3600 * SECOND
 
+    def test_what_is_prepared_is_what_would_have_come(self) -> None:
+        prepared, plain = phone(handles=SIX)[0], phone(handles=SIX)[0]
+        for tenths in range(1, 40):
+            prepared.prepare()
+            until_ns = START + tenths * SECOND // 10
+            for source in (prepared, plain):
+                if tenths == 14:
+                    source.batch(GYROSCOPE, 20_000_000, 0)
+            columns, expected = prepared.drain(until_ns).columns, plain.drain(until_ns).columns
+            assert columns.keys() == expected.keys()
+            for handle, column in expected.items():
+                assert_same(columns[handle], column)
+
     def test_batch_to_the_same_rate_leaves_the_stream_alone(self) -> None:
         source, _ = phone(handles=(GYROSCOPE,))
         before = drained(source, 1, GYROSCOPE).timestamp_ns[-1]

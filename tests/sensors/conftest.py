@@ -159,6 +159,9 @@ class RegularSource:
         self._now_ns = self.time_map.to_sample(self.clock.now_ns())
         self._done_ns = dict.fromkeys(self._done_ns, self._now_ns)
 
+    def prepare(self) -> None:
+        pass
+
     def next_sample_ns(self, handle: int) -> int | None:
         self._require_phone()
         if handle not in self._done_ns or self._modes[handle] is not ReportingMode.CONTINUOUS:

@@ -114,6 +114,8 @@ class _Daemon:
                     deadline_ns = min(deadline_ns or retry_ns, retry_ns)
                 readable = self._waiter.readable()
                 idle = not (calls_wait or readable or self._lifecycle.over)
+                if idle:
+                    self._source.prepare()
                 if idle and self._waiter.wait(deadline_ns):
                     readable = self._waiter.readable()
         reason = "it was told to stop" if self._signal is None else f"it got {signal.Signals(self._signal).name}"

@@ -160,6 +160,9 @@ class ReplaySource:
         if self._active:
             self._time_map = self._standing_at(self._drained_ns + 1)
 
+    def prepare(self) -> None:
+        """All is there: does nothing."""
+
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if the sensor is off or the replay at its end.
 

@@ -99,6 +99,11 @@ class SimulatedPhone:
         for handle in self._streams:
             self._start(handle, self._drained_ns)
 
+    def prepare(self) -> None:
+        """Make the blocks of samples needed soon: each takes milliseconds, by which a pose would else be late."""
+        for stream in self._streams.values():
+            stream.prepare()
+
     def next_sample_ns(self, handle: int) -> int | None:
         """Return the timestamp of the next sample of a sensor, None if it is not active."""
         stream = self._streams.get(handle)
@@ -153,6 +158,7 @@ class _Stream:
         self._rate_hz = rate_hz
         self._zero_ns = zero_ns
         self.after_ns = after_ns
+        self._ahead: tuple[EventColumn, list[int]] | None = None
         # Jitter keeps a sample within a third of a period of its instant: none before the last instant passed is later
         # than after_ns.
         passed = exact_period_ns(rate_hz).samples_in(after_ns - zero_ns)
@@ -182,28 +188,43 @@ class _Stream:
             self._seek(end)
         return EventColumn.concatenate(parts)
 
+    def prepare(self) -> None:
+        """Make the block behind this one, once most of this one is taken."""
+        if self._ahead is None and self._offset >= _PREPARED_FROM:
+            self._ahead = self._made(self._index + 1)
+
     def _instant_ns(self, samples: int) -> int:
         """Return where the last of the first `samples` samples of the block stands on the grid, free of jitter."""
         return self._zero_ns + exact_period_ns(self._rate_hz).until(self._index * BLOCK_SAMPLES + samples)
 
     def _seek(self, offset: int) -> None:
         if offset == BLOCK_SAMPLES:
-            self._load(self._index + 1)
+            self._use(self._index + 1, self._ahead or self._made(self._index + 1))
             offset = 0
         self._offset = offset
         self.next_ns = self._stamps[offset]
 
     def _load(self, index: int, joins: tuple[int, int] | None = None) -> None:
+        self._use(index, self._made(index, joins))
+
+    def _use(self, index: int, made: tuple[EventColumn, list[int]]) -> None:
+        self._index = index
+        self._block, self._stamps = made
+        self._ahead = None
+
+    def _made(self, index: int, joins: tuple[int, int] | None = None) -> tuple[EventColumn, list[int]]:
+        """Return a block and its timestamps, ns."""
         timestamp_ns, raw = self._model.block(self._rate_hz, index, joins)
         timestamp_ns += self._zero_ns
         if self._uncalibrated:
             values = np.concatenate([raw, np.broadcast_to(self._calibration.bias, raw.shape)], axis=1)
         else:
             values = self._calibration.apply(raw)
-        self._index = index
-        self._block = EventColumn(timestamp_ns, values, _HIGH_ACCURACY)
-        self._stamps: list[int] = timestamp_ns.tolist()
+        return EventColumn(timestamp_ns, values, _HIGH_ACCURACY), timestamp_ns.tolist()
 
+
+# Of a block at 200 Hz, the last third of a second: later than this is soon enough, and a rate may yet change.
+_PREPARED_FROM = 3 * BLOCK_SAMPLES // 4
 
 _HIGH_ACCURACY = np.full(BLOCK_SAMPLES, 3, np.int8)
 """Android's SENSOR_STATUS_ACCURACY_HIGH, of every sample: a simulated part is never in doubt."""

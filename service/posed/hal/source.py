@@ -54,6 +54,9 @@ class SensorSource(Protocol):
         A replay continues with what comes next in it, moving its time map; any other source loses what was missed.
         """
 
+    def prepare(self) -> None:
+        """Do now, while nobody waits, what the next drains would have to do; they yield the same without it."""
+
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if none is expected."""
 
