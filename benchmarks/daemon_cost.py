@@ -133,12 +133,17 @@ def _first_pose(recording: Path, first_sample_ns: int, repeats: int) -> list[Fig
 
 
 def _wake_ups(recording: Path, directory: Path, seconds: float, repeats: int) -> list[Figure]:
-    """Measure the same pipeline woken for each pose and for each event."""
-    used: dict[str, list[Usage]] = {"deadline": [], "event": []}
+    """Measure the same pipeline woken for each pose and for each event, and a process that only wakes and sends."""
+    commands = {
+        "bare": ["bare", str(directory)],
+        "deadline": ["loop", "deadline", str(recording), str(directory)],
+        "event": ["loop", "event", str(recording), str(directory)],
+    }
+    used: dict[str, list[Usage]] = {kind: [] for kind in commands}
     for repeat in range(repeats):
         _say(f"{repeat + 1}/{repeats} wake-ups")
         for kind, found in used.items():
-            found.append(_loop(kind, recording, directory, seconds))
+            found.append(_loop(commands[kind], directory, seconds))
 
     def median(kind: str, what: Callable[[Usage], float]) -> float:
         return statistics.median(map(what, used[kind]))
@@ -149,6 +154,7 @@ def _wake_ups(recording: Path, directory: Path, seconds: float, repeats: int) ->
     ]
     ratio = Repeated.of(ratios)
     return [
+        Figure("ten wake-ups and messages a second, and no more", median("bare", lambda one: one.cpu_percent), "%"),
         Figure("the pipeline alone, woken for each pose", median("deadline", lambda one: one.cpu_percent), "%"),
         Figure("- wake-ups", median("deadline", lambda one: one.wakeups_per_s), "1/s"),
         Figure("the same, woken for each event", median("event", lambda one: one.cpu_percent), "%"),
@@ -157,10 +163,9 @@ def _wake_ups(recording: Path, directory: Path, seconds: float, repeats: int) ->
     ]
 
 
-def _loop(kind: str, recording: Path, directory: Path, seconds: float) -> Usage:
-    words = [_LOAD, "loop", kind, str(recording), str(directory)]
+def _loop(command: list[str], directory: Path, seconds: float) -> Usage:
     zmq_context = context()
-    with Workload(words, os.environ) as pipeline:
+    with Workload([_LOAD, *command], os.environ) as pipeline:
         subscriber = sub(zmq_context, conflate=True)
         subscriber.subscribe(b"pose/100000\0")
         subscriber.connect(endpoint(pose_path(directory)))

@@ -6,6 +6,7 @@ python load.py count NUMBER... listeners at mixed rates in one process, which co
 python load.py first MODE      a pose client that notes when its first pose was published
 python load.py loop deadline|event RECORDING DIRECTORY
                                the daemon's pipeline alone, woken for each pose or for each event
+python load.py bare DIRECTORY  nothing but ten wake-ups a second and as large a message sent at each
 """
 
 import json
@@ -165,6 +166,34 @@ def loop(wake_per: str, recording: str, directory: Path) -> dict[str, Any]:
     return {"poses": statistics.published, "events": service.events_fused}
 
 
+def bare(directory: Path) -> dict[str, Any]:
+    """Wake and send as a daemon does for its poses, with nothing between."""
+    from posed.binder.runtime import bind_socket, pose_path, unlink_socket
+    from posed.binder.sockets import context, xpub
+    from posed.clock import BootClock
+    from posed.daemon.waiting import Waiter
+
+    path = pose_path(directory)
+    socket = xpub(context())
+    bind_socket(socket, path)
+    ended = threading.Event()
+    begin(ended.set)
+    waiter = Waiter((socket,))
+    due_ns = BootClock().now_ns()
+    sent = 0
+    while not ended.is_set():
+        for _ in waiter.readable():
+            socket.recv()
+        if not waiter.wait(due_ns):
+            socket.send(b"pose/100000\0" + bytes(150))
+            sent += 1
+            due_ns += 100_000_000
+    waiter.close()
+    socket.close()
+    unlink_socket(path)
+    return {"poses": sent}
+
+
 def main() -> int:
     """Run the process that the command line names."""
     kind, *rest = sys.argv[1:]
@@ -176,6 +205,8 @@ def main() -> int:
         result = count([int(number) for number in rest])
     elif kind == "first":
         result = first(int(rest[0]))
+    elif kind == "bare":
+        result = bare(Path(rest[0]))
     else:
         result = loop(rest[0], rest[1], Path(rest[2]))
     print(json.dumps(result), flush=True)
