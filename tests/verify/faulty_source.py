@@ -34,6 +34,7 @@ class Fault(Enum):
     FOREIGN = auto()
     WRONG_UNIT = auto()
     NOISY = auto()
+    SETTLES = auto()
     BATCH_WITHHELD = auto()
     FIFO_HALVED = auto()
     MISCALIBRATED = auto()
@@ -256,6 +257,10 @@ class FaultySource:
                 values = (0.0, 0.02, 0.01)
             case _ if sensor.type == Sensor.TYPE_GYROSCOPE:
                 values = (0.0, 0.0, 0.01)
+            case _ if sensor.type == Sensor.TYPE_ROTATION_VECTOR:
+                values = (0.0, 0.0, 0.0, 1.0)
+            case _ if sensor.type == Sensor.TYPE_PRESSURE:
+                values = (1013.0 + (4.0 if self._fault is Fault.SETTLES and n < 200 else 0.0),)
             case _ if sensor.type == Sensor.TYPE_GYROSCOPE_UNCALIBRATED:
                 values = (0.1, 0.2, 0.31, 0.1, 0.2, 0.3)
         return SensorEvent(sensor, time_ns, values, 3)

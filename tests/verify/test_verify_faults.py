@@ -99,7 +99,13 @@ def test_a_one_shot_sensor_is_waited_for_once(fault: Fault, failed: set[str]) ->
 
 
 def test_every_fault_is_tried() -> None:
-    elsewhere = {Fault.NONE, Fault.CANCELS_TWICE, Fault.MISCALIBRATED, Fault.FIVE_TIMES_TOO_FAST}
+    elsewhere = {
+        Fault.NONE,
+        Fault.CANCELS_TWICE,
+        Fault.MISCALIBRATED,
+        Fault.FIVE_TIMES_TOO_FAST,
+        Fault.SETTLES,
+    }
     tried = {*_OF_EVENTS, *_OF_BATCHES, *_OF_CALLS, *elsewhere}
     assert tried == set(Fault)
 

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from posed.client import Sensor, SensorManager
     from posed.verify.finding import Finding
     from posed.verify.matrix import Conditions
+    from posed.verify.truth import Attitude
 
 _QUICK_RATES_HZ = (0.0, 50.0, 5.0)
 
@@ -36,8 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--junit", type=Path, metavar="FILE", help="write JUnit XML")
     parser.epilog = """\
 Every sensor at FASTEST, 200, 100, 50, 25, 15, 10, 5 and 1 Hz, each event as it happens and in batches of 1 s, sensors
-side by side; then registering, flushing, triggering and changing rates. Exit code 1 if anything fails. Of a replay,
-the verifications of clocks fail unless it runs on the boot clock."""
+side by side; then against how the phone was held, where the source knows; then registering, flushing, triggering and
+changing rates. Exit code 1 if anything fails. Of a replay, the verifications of clocks fail unless it runs on the boot
+clock. Direct channels do not exist here, nor do their verifications."""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -56,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     with SensorManager(package=Package("posed-verify", permissions=(HIGH_SAMPLING_RATE_SENSORS,))) as manager:
         sensors = _chosen(arguments.sensors, manager.get_sensor_list())
         conditions = _conditions(arguments, manager)
-        todo = list(steps(manager, BootClock(), sensors, rates_hz, conditions))
+        todo = list(steps(manager, BootClock(), sensors, rates_hz, conditions, _listen_to_truth))
         with _progress(len(todo)) as progress:
             for step in todo:
                 progress(step.name)
@@ -93,6 +96,24 @@ def _conditions(arguments: argparse.Namespace, manager: "SensorManager") -> "Con
         rates_hz_of=_rate_table(arguments.profile or _profile_of_daemon()),
         fastest_asked_us=fastest_asked_us,
     )
+
+
+@contextlib.contextmanager
+def _listen_to_truth(take: "Callable[[Attitude], None]") -> Iterator[None]:
+    """Hand over what the daemon knows of how the phone is held, turned to magnetic north."""
+    from posed.client import SENSOR_DELAY_FASTEST, PoseClient, Truth
+    from posed.verify.truth import Attitude
+
+    def take_truth(truth: Truth) -> None:
+        if truth.instant_quaternion is not None:
+            x, y, z, w = truth.instant_quaternion
+            # Magnetic north lies east of the true one by the declination: about the vertical, the other way.
+            sine, cosine = math.sin(truth.declination / 2), math.cos(truth.declination / 2)
+            turned = (cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w, cosine * w - sine * z)
+            take(Attitude(truth.instant_ns, turned))
+
+    with PoseClient(SENSOR_DELAY_FASTEST, pose_rate_hz=50, every=True, on_truth=take_truth):
+        yield
 
 
 def _profile_of_daemon() -> str | None:

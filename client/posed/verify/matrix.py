@@ -14,7 +14,7 @@ from posed.verify.recording import Recording, is_fused
 from posed.verify.source import EventSource, SuiteClock
 from posed.verify.spacing import verify_gaps, verify_jitter
 from posed.verify.synchronization import verify_clock_source, verify_synchronization
-from posed.verify.values import verify_magnitude, verify_standard_deviation
+from posed.verify.values import verify_initial_value, verify_magnitude, verify_standard_deviation
 
 RATES_HZ = (0.0, 200.0, 100.0, 50.0, 25.0, 15.0, 10.0, 5.0, 1.0)
 """Those of CTS; 0 is fastest."""
@@ -121,8 +121,9 @@ def judge(recording: Recording, conditions: Conditions) -> Iterator[Finding]:
     yield verify_clock_source(recording)
     if recording.max_report_latency_us:
         yield verify_batch_arrival(recording)
-    for of_values in (verify_magnitude, verify_standard_deviation) if conditions.still else (verify_magnitude,):
-        finding = of_values(recording)
+    of_values = (verify_magnitude, verify_initial_value, *((verify_standard_deviation,) if conditions.still else ()))
+    for verify in of_values:
+        finding = verify(recording)
         if finding is not None:
             yield finding
 

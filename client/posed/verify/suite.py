@@ -10,6 +10,9 @@ from posed.verify.finding import Finding
 from posed.verify.matrix import RATES_HZ, Conditions, points, run_point
 from posed.verify.sensor_list import verify_sensor_list
 from posed.verify.source import EventSource, SuiteClock
+from posed.verify.truth import TruthStream, run_against_truth
+
+_TRUTH_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +29,14 @@ def steps(
     sensors: Sequence[Sensor],
     rates_hz: Sequence[float] = RATES_HZ,
     conditions: Conditions | None = None,
+    listen: TruthStream | None = None,
 ) -> Iterator[Step]:
-    """Yield the steps of the suite for these sensors: the list, the matrix, then the behaviours of each."""
+    """Yield the steps of the suite for these sensors: the list, the matrix, the truth, then the behaviours of each."""
     yield Step("sensor list", partial(verify_sensor_list, list(sensors)))
     for point in points(sensors, rates_hz):
         yield Step(point.name, partial(run_point, source, clock, point, conditions or Conditions()))
+    if listen is not None:
+        yield Step("against the truth", partial(run_against_truth, source, clock, sensors, listen, _TRUTH_S))
     for sensor in sensors:
         for name, verify in Behaviour(source, clock, sensor).verifications().items():
             subject = sensor.string_type.removeprefix("android.sensor.")

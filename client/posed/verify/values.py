@@ -1,13 +1,16 @@
-"""MagnitudeVerification and StandardDeviationVerification: values are those of the sensor."""
+"""MagnitudeVerification, StandardDeviationVerification and InitialValueVerification: values are those of the sensor."""
 
 import math
 
 from posed.client.sensor import Sensor
-from posed.verify.finding import Finding, judged
+from posed.verify.finding import Finding, judged, skipped
 from posed.verify.recording import Received, Recording
 
 MAGNITUDE = "Magnitude"
 STANDARD_DEVIATION = "StandardDeviation"
+INITIAL_VALUE = "InitialValue"
+_INITIAL_NS = 2_000_000_000
+_PRESSURE_HPA = 3.0
 _MAGNITUDES = {Sensor.TYPE_ACCELEROMETER: (9.80665, 1.5), Sensor.TYPE_GYROSCOPE: (0.0, 1.5)}
 _DEVIATIONS = {Sensor.TYPE_ACCELEROMETER: 1.0, Sensor.TYPE_GYROSCOPE: 0.5}
 
@@ -31,6 +34,22 @@ def verify_standard_deviation(recording: Recording) -> Finding | None:
     limit = _DEVIATIONS[recording.sensor.type]
     worst = max(_deviation([each.event.values[axis] for each in _own(recording)]) for axis in range(3))
     return judged(STANDARD_DEVIATION, recording.subject, f"{worst:.4f}", f"at most {limit:g}", worst <= limit)
+
+
+def verify_initial_value(recording: Recording) -> Finding | None:
+    """Judge the mean of the first 2 s against that of the rest: pressure 3 hPa; Android bounds no other sensor."""
+    if recording.sensor.type != Sensor.TYPE_PRESSURE:
+        return None
+    own = [each.event for each in _own(recording)]
+    begun_ns = min((event.timestamp for event in own), default=0)
+    first = [event.values[0] for event in own if event.timestamp - begun_ns <= _INITIAL_NS]
+    rest = [event.values[0] for event in own if event.timestamp - begun_ns > _INITIAL_NS]
+    if not first or not rest:
+        return skipped(INITIAL_VALUE, recording.subject, "too short for a beginning and a rest")
+    off = abs(sum(first) / len(first) - sum(rest) / len(rest))
+    return judged(
+        INITIAL_VALUE, recording.subject, f"{off:.3f} hPa", f"at most {_PRESSURE_HPA:g}", off <= _PRESSURE_HPA
+    )
 
 
 def _own(recording: Recording) -> list[Received]:
