@@ -29,6 +29,27 @@ def page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
         page.close()
 
 
+def test_what_one_daemon_knew_is_forgotten_with_the_next(page: Page) -> None:
+    found = page.evaluate(
+        """async () => {
+            const { Scene } = await import("/page/scene.js");
+            const scene = new Scene();
+            const place = { latitude: 40, longitude: 22, height: 60, source: "gnss", wmm_declination_deg: 5 };
+            scene.takeLink({ state: "CONNECTED", reason: "" });
+            scene.takeTruth({ t: 0, q: [0, 0, 0, 1], d: 4, e: [100, 0, 0] });
+            scene.takeObserver(place);
+            const before = [scene.declination.source, scene.start.longitude < 22];
+            scene.takeLink({ state: "DISCONNECTED", reason: "" });
+            const meanwhile = scene.truth !== null;
+            scene.takeLink({ state: "CONNECTED", reason: "" });
+            const after = [scene.declination.source, scene.start.longitude === 22];
+            scene.takeObserver(null);
+            return [before, meanwhile, after, scene.start, scene.knownPosition, scene.declination.source];
+        }"""
+    )
+    assert found == [["truth", True], True, ["WMM 2025", True], None, None, "unknown"]
+
+
 @pytest.mark.parametrize(
     ("degrees", "unit", "digits", "text"),
     [

@@ -55,6 +55,7 @@ def test_a_name_that_cannot_be_shown_is_refused(store: CorrectionStore, name: st
         ({"heading_offset_deg": True}, "heading_offset_deg = True"),
         ({"heading_offset_deg": float("nan")}, "heading_offset_deg = nan"),
         ({"heading_offset_deg": 361}, "from -360 to 360"),
+        ({"heading_offset_deg": 10**400}, "from -360 to 360"),
         ({"heading_offset_deg": 0, "position": [1, 2, 3]}, "position is null or an object"),
         ({"heading_offset_deg": 0, "position": {"latitude": 91, "longitude": 0, "height": 0}}, "latitude = 91"),
         ({"heading_offset_deg": 0, "position": {"latitude": 0, "longitude": 0}}, "height = None"),
@@ -112,7 +113,12 @@ def test_a_page_saves_lists_and_deletes_them(served: Served, store: CorrectionSt
 
 @pytest.mark.parametrize(
     ("body", "said"),
-    [("{", "is not JSON"), ("{}", "heading_offset_deg"), ('{"x": "' + "y" * 5000 + '"}', "more than 4000 bytes")],
+    [
+        ("{", "is not JSON"),
+        ("[" * 3000, "is not JSON"),
+        ("{}", "heading_offset_deg"),
+        ('{"x": "' + "y" * 5000 + '"}', "more than 4000 bytes"),
+    ],
 )
 def test_a_page_that_sends_nonsense_is_told_so(served: Served, body: str, said: str) -> None:
     status, _, answer = served.ask("/corrections/mine", "PUT", body, served.enter())

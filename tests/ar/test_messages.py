@@ -1,14 +1,16 @@
 """What the page is sent."""
 
+import dataclasses
 import datetime
 import json
 import math
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
 
 from posed.ar.declination import wmm_declination_deg
-from posed.ar.stream import observer_message, pose_message, truth_message
+from posed.ar.stream import ServiceFeed, observer_message, pose_message, truth_message
 from posed.client import Pose, Position, Truth
 from posed.client.pose import Delivery, PoseStatus
 from posed.hal.sensor_model import THESSALONIKI
@@ -38,6 +40,7 @@ _poses = st.builds(
     events_fused=st.integers(0, 10_000),
     position=st.none(),
     missed=st.integers(0, 10_000),
+    predicted_ns=st.integers(0, 10**9),
 )
 _metres = st.floats(-1e5, 1e5)
 _truths = st.builds(
@@ -59,7 +62,7 @@ def test_a_frame_is_small_and_rounds_by_less_than_can_be_seen(pose: Pose, truth:
     frame = json.dumps({"i": 10**7, "p": p, "t": t}, separators=(",", ":"))
     assert len(frame.encode()) < _MAX_FRAME_BYTES
     assert max(abs(a - b) for a, b in zip(p["q"], pose.quaternion, strict=True)) <= 5.001e-7
-    assert abs(p["t"] * 1e6 - pose.delivery.to_boot_ns(pose.timestamp_ns)) <= 600
+    assert abs(p["t"] * 1e6 - pose.delivery.to_boot_ns(pose.timestamp_ns + pose.predicted_ns)) <= 600
     assert abs(t["t"] * 1e6 - truth.delivery.to_boot_ns(truth.instant_ns)) <= 600
     assert abs(math.radians(p["a"]) - pose.heading_accuracy) < 1e-4
     assert abs(math.radians(t["d"]) - truth.declination) < 1e-5
@@ -69,6 +72,20 @@ def test_the_observer_comes_with_the_declination_of_his_place() -> None:
     o = observer_message(Position(40.6265, 22.9591, 72.5, (0.0,) * 9, (0.0, 0.0, 0.0), "stated", None))
     assert (o["latitude"], o["longitude"], o["height"], o["source"]) == (40.6265, 22.9591, 72.5, "stated")
     assert o["wmm_declination_deg"] == wmm_declination_deg(40.6265, 22.9591, datetime.date.today())
+
+
+def test_a_daemon_that_knows_no_position_takes_the_one_before_back() -> None:
+    told: list[tuple[str, Any]] = []
+    feed = ServiceFeed("GAME", auto_create=False)
+    feed._publish = lambda key, value: told.append((key, value))
+    here = Position(40.6265, 22.9591, 72.5, (0.0,) * 9, (0.0, 0.0, 0.0), "stated", None)
+    pose = Pose(
+        Delivery(bytes(16), 1, 0, 0, 1.0), 0, (0, 0, 0, 1), (0, 0, 0), 0.1, "dcm", PoseStatus(0), "GAME", 1, None
+    )
+    for position in (None, here, here, None):
+        feed._take_pose(dataclasses.replace(pose, position=position))
+    observers = [value for key, value in told if key == "o"]
+    assert [observer and observer["latitude"] for observer in observers] == [40.6265, None]
 
 
 def test_the_declination_is_that_of_the_world_magnetic_model() -> None:

@@ -166,6 +166,15 @@ _MENDED = {
         _collection(viewpoint={"type": "Point", "coordinates": [1, 2]}),
         "expected a Point with a height",
     ),
+    "a viewpoint of nothing": (
+        _collection(viewpoint={"type": "GeometryCollection", "geometries": []}),
+        "expected a Point with a height",
+    ),
+    "more digits than a number has": (
+        _feature("Point", [10**400, 2]),
+        "expected a number",
+    ),
+    "a depth without end": ("[" * 100_000, "nested too deep"),
     "an old file of another system": (
         _collection(crs={"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::2100"}}),
         "its crs is 'urn:ogc:def:crs:EPSG::2100'; give it with --crs",

@@ -100,6 +100,34 @@ def test_the_daemon_it_brought_ends_with_it_and_the_users_own_stays(shell: Shell
     assert daemon_listens()
 
 
+@pytest.mark.parametrize(
+    ("host", "base"),
+    [("127.1", "http://127.0.0.1:"), ("LOCALHOST", "http://localhost:"), ("[0:0:0:0:0:0:0:1]", "http://[::1]:")],
+)
+def test_a_host_is_spelled_as_browsers_spell_it(shell: Shell, host: str, base: str) -> None:
+    browser = Browser(shell.begin("ar", "--port", "0", "--host", host))
+    assert browser.base.startswith(base)
+    assert "<title>posed AR</title>" in browser.page
+
+
+def test_a_reader_that_goes_after_the_first_link_ends_nothing(shell: Shell) -> None:
+    process = shell.begin("ar", "--port", "0")
+    assert process.stdout is not None
+    link = process.stdout.readline().split()[-1]
+    process.stdout.close()
+    cookies = urllib.request.HTTPCookieProcessor(CookieJar())
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}), cookies)
+    assert b"<title>posed AR</title>" in opener.open(link, timeout=_PATIENCE_S).read()
+    assert shell.end(process, signal.SIGTERM) == (0, "")
+
+
+def test_places_that_cannot_be_shown_yet_are_said_with_the_remedy(shell: Shell, tmp_path: Path) -> None:
+    (tmp_path / "mine.geojson").write_text('{"type": "Point", "coordinates": [22, 40, 10]}')
+    process = shell.begin("ar", "--port", "0", "--places", str(tmp_path / "mine.geojson"))
+    assert process.stderr is not None
+    assert "with --position LAT,LON,HEIGHT" in process.stderr.readline()
+
+
 def test_without_options_it_shows_the_sample_and_says_where_north_is(shell: Shell) -> None:
     process = shell.begin("ar", "--port", "0")
     browser = Browser(process)

@@ -1,15 +1,19 @@
 """Who may see a page."""
 
+import asyncio
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from served import Served, SilentFeed
+from starlette.applications import Starlette
+from starlette.types import Message
 from websockets.exceptions import InvalidStatus
 
 from posed.ar.app import ArContent
 from posed.ar.corrections import CorrectionStore
 from posed.errors import InvalidArgumentError
+from posed.web.access import Access
 from posed.web.server import LOOPBACK, listen
 
 _PATHS = ("/", "/places.json", "/settings.json", "/background", "/corrections.json", "/page/ar.css", "/web/base.css")
@@ -56,6 +60,37 @@ def test_a_server_asked_by_another_name_refuses(served: Served, host: str) -> No
     status, _, said = served.ask("/", headers={"Cookie": cookie, "Host": host.format(port=served.port)})
     assert status == 403
     assert "does not answer for" in said
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "base"),
+    [
+        ("127.0.0.1", 80, "http://127.0.0.1/"),
+        ("127.0.0.1", 8474, "http://127.0.0.1:8474/"),
+        ("::1", 80, "http://[::1]/"),
+    ],
+)
+def test_the_port_of_http_is_left_out_as_browsers_do(host: str, port: int, base: str) -> None:
+    links: list[str] = []
+    access = Access(Starlette(), (host,), port, links.append)
+    assert links[0].startswith(f"{base}?token=")
+    scope = {
+        "type": "http",
+        "method": "GET",
+        "path": "/",
+        "query_string": links[0].partition("?")[2].encode(),
+        "headers": [(b"host", base.split("/")[2].encode())],
+    }
+    sent: list[Message] = []
+
+    async def receive() -> Message:
+        return {"type": "http.request"}
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    asyncio.run(access(scope, receive, send))
+    assert sent[0]["status"] == 303
 
 
 def test_on_loopback_it_is_localhost_too(served: Served) -> None:

@@ -153,9 +153,13 @@ def test_a_page_learns_the_servers_clock(served: Served) -> None:
 
 
 @pytest.mark.parametrize(
-    "request_text", ["no JSON", "[1]", '{"m": "TURBO"}', json.dumps({"m": "x" * 2500})], ids=lambda text: text[:12]
+    "request_text",
+    ["no JSON", "[1]", '{"m": "TURBO"}', json.dumps({"m": "x" * 2500}), "[" * 1900, json.dumps({"m": "é" * 90}), b"{}"],
+    ids=lambda text: str(text[:12]),
 )
-def test_a_request_that_makes_no_sense_ends_that_page_only(served: Served, feed: SilentFeed, request_text: str) -> None:
+def test_a_request_that_makes_no_sense_ends_that_page_only(
+    served: Served, feed: SilentFeed, request_text: str | bytes
+) -> None:
     headers = served.enter()
     with served.open(headers) as other, served.open(headers) as page:
         page.send(request_text)

@@ -72,6 +72,8 @@ class _Ar:
         try:
             yield
         finally:
+            if self._feeding:
+                await asyncio.wait(set(self._feeding))
             await asyncio.to_thread(self._feed.close)
 
     async def _page(self, request: Request) -> Response:
@@ -143,7 +145,7 @@ async def _body(request: Request) -> Any:
             raise InvalidArgumentError(f"a body of more than {_MAX_BODY_BYTES} bytes")
     try:
         return json.loads(received)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise InvalidArgumentError(f"the body is not JSON: {error}") from error
 
 

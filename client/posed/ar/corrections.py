@@ -1,7 +1,6 @@
 """Pose corrections by name, kept for the next time."""
 
 import json
-import math
 import os
 import tempfile
 from pathlib import Path
@@ -88,6 +87,6 @@ def correction(value: Any) -> dict[str, Any]:
 
 def _number(values: dict[str, Any], key: str, limit: float) -> float:
     value = values.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > limit:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= limit:
         raise InvalidArgumentError(f"{key} = {value!r}; allowed: a number from -{limit} to {limit}")
     return float(value)

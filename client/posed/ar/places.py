@@ -15,6 +15,7 @@ _NAMES = ("name", "title", "Name", "NAME")
 _NOTES = ("note", "description")
 _COLORS = ("color", "marker-color", "stroke")
 _MAX_HEIGHT_M = 100_000.0
+_MAX_NUMBER = 1e300
 _PARTS = {"MultiPoint": "Point", "MultiLineString": "LineString", "MultiPolygon": "Polygon"}
 _TYPES = ("Point", "LineString", "Polygon", *_PARTS, "GeometryCollection")
 
@@ -75,8 +76,9 @@ class _Reader:
         """Return where the file says to stand, if it does."""
         if point is None:
             return None
-        ((kind, (position, *_)), *_) = self._shapes(point, "viewpoint")
-        if kind != "point" or position[2] is None:
+        kind, coordinates = next(self._shapes(point, "viewpoint"), ("nothing", []))
+        position = coordinates[0] if kind == "point" else [None, None, None]
+        if position[2] is None:
             raise InvalidArgumentError(f"viewpoint = {_shown(point)}; expected a Point with a height")
         return {"latitude": position[1], "longitude": position[0], "height": position[2]}
 
@@ -143,6 +145,8 @@ def _read(path: Path) -> dict[str, Any]:
         raise InvalidArgumentError(f"cannot read {path}: {error.strerror}; name a GeoJSON file") from error
     except ValueError as error:
         raise InvalidArgumentError(f"{path} is not JSON ({error}); name a GeoJSON file") from error
+    except RecursionError:
+        raise InvalidArgumentError(f"{path} is nested too deep for GeoJSON; name a GeoJSON file") from None
     if not isinstance(content, dict) or "type" not in content:
         raise InvalidArgumentError(f"{path} is not GeoJSON: expected an object with a type, such as FeatureCollection")
     return content
@@ -202,7 +206,8 @@ def _list(value: Any, what: str) -> list[Any]:
 
 
 def _number(value: Any, what: str, limit: float = math.inf) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or abs(value) > limit:
+    # Compared, not converted: JSON has whole numbers that no float can hold.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= min(limit, _MAX_NUMBER):
         within = "" if math.isinf(limit) else f" within {limit:g} m of the ellipsoid"
         raise InvalidArgumentError(f"{what} {_shown(value)}; expected a number{within}")
     return float(value)

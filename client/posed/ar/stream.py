@@ -1,6 +1,7 @@
 """What the page is fed: the poses of the running service, and the truth where a page asks for it."""
 
 import datetime
+import math
 from collections.abc import Callable
 from typing import Any, Protocol
 
@@ -39,7 +40,8 @@ class ServiceFeed:
     orientation, w angular rate (rad/s, device axes), a heading accuracy, s status bits, m rate mode in force, f events
     fused, x poses missed before it.
     t: the truth at a grid instant, against true north: t, q, d declination, e position east, north, up from the start
-    (m) or null. o: the observer. s: state of the binding, and the reason. v: the phone.
+    (m) or null. o: the observer, null where the daemon knows no position. s: state of the binding, and the reason.
+    v: the phone.
     """
 
     def __init__(self, rate_mode: str, *, auto_create: bool) -> None:
@@ -94,9 +96,9 @@ class ServiceFeed:
 
     def _take_pose(self, pose: Pose) -> None:
         self._publish("p", pose_message(pose))
-        if pose.position != self._position and pose.position is not None:
+        if pose.position != self._position:
             self._position = pose.position
-            self._publish("o", observer_message(pose.position))
+            self._publish("o", pose.position and observer_message(pose.position))
 
     def _take_truth(self, truth: Truth) -> None:
         if truth.instant_quaternion is not None:
@@ -111,7 +113,7 @@ def pose_message(pose: Pose) -> dict[str, Any]:
         "b": _ms(pose.delivery.published_ns),
         "q": [round(q, 6) for q in pose.quaternion],
         "w": [round(w, 4) for w in pose.angular_rate],
-        "a": round(pose.heading_accuracy * 57.29577951, 2),
+        "a": round(math.degrees(pose.heading_accuracy), 2),
         "s": int(pose.status),
         "m": pose.rate_mode,
         "f": pose.events_fused,
@@ -125,7 +127,7 @@ def truth_message(truth: Truth) -> dict[str, Any]:
     return {
         "t": _ms(truth.delivery.to_boot_ns(truth.instant_ns)),
         "q": [round(q, 6) for q in truth.instant_quaternion or ()],
-        "d": round(truth.declination * 57.29577951, 3),
+        "d": round(math.degrees(truth.declination), 3),
         "e": None if enu is None else [round(metres, 2) for metres in enu],
     }
 

@@ -7,6 +7,8 @@ import ipaddress
 import math
 import mimetypes
 import signal
+import socket
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ from posed.client.launcher import daemon_listens
 from posed.errors import InvalidArgumentError, MissingExtraError
 
 _PORT = 8474
+# What the extra `web` brings and this command needs.
+_EXTRA = ("starlette", "uvicorn", "websockets", "pygeomag")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,7 +87,9 @@ def run(arguments: argparse.Namespace) -> int:
         from posed.ar.stream import ServiceFeed
         from posed.web.server import guarded, listen, make_server
     except ImportError as error:
-        needed = (error.name or str(error)).partition(".")[0]
+        needed = (error.name or "").partition(".")[0]
+        if needed not in _EXTRA:
+            raise
         raise MissingExtraError(f"posed ar needs {needed}; install it with: pip install 'posed[web]'") from error
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -92,6 +98,12 @@ def run(arguments: argparse.Namespace) -> int:
     if background is not None:
         _require_picture(background)
     content = ArContent(places, _settings(arguments, places["viewpoint"]), background)
+    if places["places"] and places["viewpoint"] is None and arguments.position is None:
+        print(
+            "posed: the file names no viewpoint: its places show once the daemon knows the phone's position, or with"
+            " --position LAT,LON,HEIGHT",
+            file=sys.stderr,
+        )
     corrections = CorrectionStore(arguments.corrections or default_path())
     corrections.load()  # better refused now than when the user saves one
     feed = ServiceFeed(arguments.mode, auto_create=not daemon_listens())
@@ -120,7 +132,9 @@ def _settings(arguments: argparse.Namespace, viewpoint: dict[str, float] | None)
 
 
 def _tell_link(link: str) -> None:
-    print(f"AR page, for one browser: {link}", flush=True)
+    # A reader that took the first link and went must not end those who follow it.
+    with contextlib.suppress(BrokenPipeError):
+        print(f"AR page, for one browser: {link}", flush=True)
 
 
 def _require_picture(path: Path) -> None:
@@ -159,15 +173,19 @@ def _declination(text: str) -> float:
 
 
 def _host(text: str) -> str:
+    """Return an address or name as browsers spell it, which requests are compared with."""
     try:
-        address = ipaddress.ip_address(text)
+        address = ipaddress.ip_address(text.strip("[]"))
     except ValueError:
-        return text
+        try:
+            address = ipaddress.ip_address(socket.inet_aton(text))  # short forms, such as 127.1
+        except OSError:
+            return text.lower()
     if address.is_unspecified:
         raise argparse.ArgumentTypeError(
             f"{text} stands for every address; give the one by which the page is to be reached"
         )
-    return text
+    return str(address)
 
 
 def _port(text: str) -> int:

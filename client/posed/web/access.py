@@ -32,8 +32,10 @@ class Access:
     def __init__(self, app: ASGIApp, hosts: tuple[str, ...], port: int, tell_link: Callable[[str], None]) -> None:
         """hosts: names and addresses by which this server may be asked. tell_link: shows a link to the user."""
         self._app = app
-        self._authorities = frozenset(f"{_bracketed(host)}:{port}" for host in hosts)
-        self._base = f"http://{_bracketed(hosts[0])}:{port}/"
+        # Browsers leave the port of http out.
+        suffix = "" if port == 80 else f":{port}"
+        self._authorities = frozenset(f"{_bracketed(host)}{suffix}" for host in hosts)
+        self._base = f"http://{_bracketed(hosts[0])}{suffix}/"
         # Cookies know no ports: two servers on one host would overwrite each other's.
         self._cookie = f"posed-{port}"
         self._sessions: list[str] = []

@@ -89,16 +89,18 @@ class Hub:
         sending = asyncio.create_task(_send(socket, outbox))
         try:
             while True:
-                request = _request(await socket.receive_text())
+                message = await socket.receive()
+                if message["type"] == "websocket.disconnect":
+                    break
+                request = _request(message.get("text"))
                 frame = request.get("a")
                 if isinstance(frame, int):
                     outbox.acknowledge(frame)
                 else:
                     on_request(outbox, request)
-        except WebSocketDisconnect:
-            pass
         except ValueError as error:
-            await socket.close(1007, str(error)[:100])
+            # The reason of a close frame has room for 123 bytes.
+            await socket.close(1007, str(error).encode()[:120].decode(errors="ignore"))
         finally:
             sending.cancel()
             del self._pages[outbox]
@@ -136,10 +138,15 @@ async def _send(socket: WebSocket, outbox: Outbox) -> None:
         pass
 
 
-def _request(text: str) -> dict[str, Any]:
+def _request(text: str | None) -> dict[str, Any]:
+    if text is None:
+        raise ValueError("a request in binary; send JSON as text")
     if len(text) > _MAX_REQUEST_BYTES:
         raise ValueError(f"a request of {len(text)} characters; at most {_MAX_REQUEST_BYTES}")
-    request = json.loads(text)
+    try:
+        request = json.loads(text)
+    except RecursionError:
+        raise ValueError("a request nested too deep") from None
     if not isinstance(request, dict):
         raise ValueError("a request must be a JSON object")
     return request

@@ -83,7 +83,7 @@ const live = new Live("/live", {
       settings.show();
     },
     s: (link) => {
-      scene.link = link;
+      scene.takeLink(link);
       read();
     },
   },
@@ -94,16 +94,12 @@ const settings = new SettingsPanel(scene, frame.background, () => {
   resize();
   book.show();
 });
-const correction = new CorrectionPanel(scene, target, frame, { changed: redraw, tell, bootMs: () => live.bootMs() });
+const correction = new CorrectionPanel(scene, target, frame, { changed: redraw, tell: notify, bootMs: () => live.bootMs() });
 const book = new Book(() => scene.chosen.unit, notify);
 const panels = new Panels((id) => {
   if (id === "settings") settings.show();
   if (id === "correct") void correction.show();
 });
-
-function tell(text) {
-  notify(text);
-}
 
 /** A drawn view needs the truth, and only where somebody looks. */
 function askForTruth() {
@@ -184,7 +180,7 @@ function step(direction) {
 
 function record() {
   if (scene.pose === null) {
-    tell("There is no pose to record yet.");
+    notify("There is no pose to record yet.");
     return;
   }
   const { place } = target;
@@ -207,7 +203,7 @@ function record() {
     mode: scene.pose.m,
     sequence: scene.pose.n,
   });
-  tell(words);
+  notify(words);
 }
 
 function setMode(mode) {
@@ -248,7 +244,7 @@ listenToKeys({
   "=": () => settings.zoom(1),
   "-": () => settings.zoom(-1),
   v: () => settings.nextView(),
-  e: () => tell(`Extrapolation between poses is ${settings.toggleExtrapolation() ? "on" : "off"}.`),
+  e: () => notify(`Extrapolation between poses is ${settings.toggleExtrapolation() ? "on" : "off"}.`),
   b: () => panels.toggle("book"),
   c: () => panels.toggle("correct"),
   s: () => panels.toggle("settings"),
@@ -293,5 +289,5 @@ window.posedAr = told({ scene, target, frame, live, pace, delay });
 resize();
 stage.focus();
 load().catch((error) => {
-  tell(`The page could not be set up (${error.message}). Load it again.`);
+  notify(`The page could not be set up (${error.message}). Load it again.`);
 });

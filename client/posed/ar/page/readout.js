@@ -99,11 +99,6 @@ export class Readout {
     document.getElementById("said").textContent = text;
   }
 
-  /** Say now, as the answer to something the user did. */
-  say(text) {
-    document.getElementById("said").textContent = text;
-  }
-
   /** @param {?{state:string, reason:string}} link  why no pose comes; null while they do */
   showBanner(link, silentMs) {
     const isHidden = link === null;

@@ -17,7 +17,7 @@ const PACE_KEPT = 16;
 
 export class Scene {
   constructor() {
-    this.camera = makeCamera(1, 1, 65, 0);
+    this.camera = new Camera({ width: 1, height: 1, fovDeg: 65, rotation: 0 });
     this.places = new Places();
     this.settings = { declination_deg: null, wmm_declination_deg: null, position: null, background: null };
     /** What the user chose; null follows the device, the server or the truth. */
@@ -70,8 +70,26 @@ export class Scene {
     return this._frozen !== null;
   }
 
+  /** Take how the way to the daemon stands; one that has just been found may be another phone, somewhere else. */
+  takeLink(link) {
+    if (link.state === "CONNECTED" && this.link.state !== "CONNECTED") this._forgetTruth();
+    this.link = link;
+  }
+
+  _forgetTruth() {
+    this.truth = null;
+    this._previousTruth = null;
+    this._start = null;
+    if (this.observer !== null) this.takeObserver(this.observer);
+  }
+
+  /** @param {?Object} place  null where the daemon knows no position */
   takeObserver(place) {
     this.observer = place;
+    if (place === null) {
+      this._start = null;
+      return;
+    }
     // The truth's path begins at a position that was stated; a measured one is where it has come to.
     const gone = this.truth?.e ?? [0, 0, 0];
     if (place.source === "fixed") this._start = place;
@@ -163,14 +181,10 @@ export class Scene {
 
   /** Fit the camera to a window of so many CSS pixels. */
   fitCamera(width, height) {
-    const fov = this.chosen.fovDeg ?? this.device.fov_deg;
+    const fovDeg = this.chosen.fovDeg ?? this.device.fov_deg;
     const rotation = this.chosen.rotation ?? this.device.rotation;
-    this.camera = makeCamera(width, height, fov, rotation);
+    this.camera = new Camera({ width, height, fovDeg, rotation });
   }
-}
-
-function makeCamera(width, height, fovDeg, rotation) {
-  return new Camera({ width, height, fovDeg, rotation });
 }
 
 /** Angular rate in device axes, rad/s, that leads from one orientation to another. */

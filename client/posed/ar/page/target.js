@@ -20,10 +20,6 @@ export class Target {
     this.isHeld = place !== null;
   }
 
-  release() {
-    this.hold(null);
-  }
-
   /** Take what is under the cross, unless a target is held. */
   aim(places, drawn, projector) {
     if (this.isHeld) {
