@@ -151,7 +151,8 @@ def test_values_that_need_a_permission_are_masked(make_bench: MakeBench) -> None
     bench = make_bench((SensorType.STEP_DETECTOR,))
     sensor = bench.service._table[SensorType.STEP_DETECTOR]
     sensor.info = replace(sensor.info, required_permission="android.permission.ACTIVITY_RECOGNITION")
-    bench.service.enable(bench.service.connect(_APP), SensorType.STEP_DETECTOR, 0, 0)
+    walker = replace(_APP, permissions=frozenset((sensor.info.required_permission,)))
+    bench.service.enable(bench.service.connect(walker), SensorType.STEP_DETECTOR, 0, 0)
     bench.source.happen(SensorType.STEP_DETECTOR, 10, 1)
     bench.advance_ms(20)
     assert _section(_dump(bench), "Recent Sensor")[1].endswith(") [value masked]")

@@ -14,14 +14,14 @@ from posed.binder.proxy import Proxy
 from posed.binder.runtime import control_path, runtime_directory
 from posed.binder.status import DeadObjectError, TransactionTimeoutError
 from posed.client.launcher import daemon_listens
-from posed.client.package import HIGH_SAMPLING_RATE_SENSORS, Package
+from posed.client.package import ACTIVITY_RECOGNITION, HIGH_SAMPLING_RATE_SENSORS, Package
 from posed.errors import PosedError, ServiceUnavailableError
 from posed.proto import binder_pb2, sensors_pb2, service_manager_pb2
 
 # Of a daemon that lives, connecting takes 2 ms; a stopped or hung one is not worth a longer wait.
 _TIMEOUT_S = 2.0
 
-PACKAGE = Package("posed.cli", permissions=(HIGH_SAMPLING_RATE_SENSORS,))
+PACKAGE = Package("posed.cli", permissions=(HIGH_SAMPLING_RATE_SENSORS, ACTIVITY_RECOGNITION))
 """What the command says of itself when it binds: as Android's shell, it may sample as fast as a sensor goes."""
 
 

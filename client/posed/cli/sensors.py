@@ -19,6 +19,11 @@ _UNITS = {
     Sensor.TYPE_GYROSCOPE_UNCALIBRATED: "rad/s",
     Sensor.TYPE_MAGNETIC_FIELD: "µT",
     Sensor.TYPE_MAGNETIC_FIELD_UNCALIBRATED: "µT",
+    Sensor.TYPE_ORIENTATION: "°",
+    Sensor.TYPE_HEADING: "°",
+    Sensor.TYPE_LIGHT: "lx",
+    Sensor.TYPE_PRESSURE: "hPa",
+    Sensor.TYPE_PROXIMITY: "cm",
 }
 
 
@@ -50,7 +55,7 @@ def short_name(sensor: Sensor) -> str:
 
 
 def unit(sensor: Sensor) -> str:
-    """Return the unit of a sensor's values, empty for the rotation vector."""
+    """Return the unit of a sensor's values, empty for one that has none, such as the rotation vector."""
     return _UNITS.get(sensor.type, "")
 
 

@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the suite, print the table, return 1 if anything failed."""
     require_daemon()
     from posed.cli.verify_table import print_table
-    from posed.client import HIGH_SAMPLING_RATE_SENSORS, Package, SensorManager
+    from posed.client import ACTIVITY_RECOGNITION, HIGH_SAMPLING_RATE_SENSORS, Package, SensorManager
     from posed.verify.finding import Verdict
     from posed.verify.matrix import RATES_HZ
     from posed.verify.source import BootClock
@@ -56,7 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
     rates_hz = arguments.rates or (_QUICK_RATES_HZ if arguments.quick else RATES_HZ)
     begun = time.monotonic()
     findings: list[Finding] = []
-    with SensorManager(package=Package("posed-verify", permissions=(HIGH_SAMPLING_RATE_SENSORS,))) as manager:
+    with SensorManager(
+        package=Package("posed-verify", permissions=(HIGH_SAMPLING_RATE_SENSORS, ACTIVITY_RECOGNITION))
+    ) as manager:
         sensors = _chosen(arguments.sensors, manager.get_sensor_list())
         conditions = _conditions(arguments, manager)
         todo = list(steps(manager, BootClock(), sensors, rates_hz, conditions, _listen_to_truth))

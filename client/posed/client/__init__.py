@@ -3,7 +3,7 @@
 from posed.client.binding import ServiceState
 from posed.client.event_stream import EventStream
 from posed.client.handler import Handler
-from posed.client.package import HIGH_SAMPLING_RATE_SENSORS, Package
+from posed.client.package import ACTIVITY_RECOGNITION, HIGH_SAMPLING_RATE_SENSORS, Package
 from posed.client.pose import Device, Pose, PoseStatus, Position, Truth
 from posed.client.pose_client import PoseClient
 from posed.client.sensor import (
@@ -26,6 +26,7 @@ from posed.client.sensor import (
 from posed.client.sensor_manager import SensorManager
 
 __all__ = [
+    "ACTIVITY_RECOGNITION",
     "HIGH_SAMPLING_RATE_SENSORS",
     "SENSOR_DELAY_FASTEST",
     "SENSOR_DELAY_GAME",

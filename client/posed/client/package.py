@@ -4,6 +4,8 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
+ACTIVITY_RECOGNITION = "android.permission.ACTIVITY_RECOGNITION"
+"""Needed for step detector and step counter."""
 HIGH_SAMPLING_RATE_SENSORS = "android.permission.HIGH_SAMPLING_RATE_SENSORS"
 """Lets a package sample accelerometer, gyroscope and magnetometer faster than 200 Hz."""
 

@@ -28,7 +28,8 @@ from posed.daemon.waiting import Waiter
 from posed.hal import open_source
 from posed.hal.profile import load_profile
 from posed.proto import events_pb2
-from posed.sensors import SensorService, make_device_filter
+from posed.sensors import SensorService, device_noise, make_device_filter
+from posed.sensors.declination import declination_at
 
 _log = logging.getLogger(__name__)
 
@@ -66,7 +67,15 @@ class _Daemon:
             config.source, profile, clock, seed=config.seed, speed=config.speed, loop=config.loop
         )
         orientation_filter = make_device_filter(config.filter, profile)
-        self._service = SensorService(self._source, orientation_filter, clock, config.position, aligned=config.aligned)
+        self._service = SensorService(
+            self._source,
+            orientation_filter,
+            clock,
+            config.position,
+            aligned=config.aligned,
+            declination=declination_at(config.position),
+            noise=device_noise(profile),
+        )
         self._context = context()
         self._server = Server(control_path(directory), self._context)
         statistics = PublicationStatistics()

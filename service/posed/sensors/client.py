@@ -9,6 +9,7 @@ CAPPED_SAMPLING_PERIOD_US = 5_000
 """The fastest that a client without the permission may ask (SensorService.h, 200 Hz)."""
 
 _CAPPING_SDK = 31
+_ACTIVITY_RECOGNITION_SDK = 29
 _CAPPED_TYPES = frozenset(
     (
         SensorType.ACCELEROMETER,
@@ -41,6 +42,14 @@ class Client:
             and self.target_sdk >= _CAPPING_SDK
             and HIGH_SAMPLING_RATE_SENSORS not in self.permissions
         )
+
+    def may_use(self, sensor: SensorInfo) -> bool:
+        """Return whether it has the permission that a sensor needs (SensorService::canAccessSensor).
+
+        The permission of step sensors is as old as Android 10: programs written for what was before need none.
+        """
+        needs = sensor.required_permission
+        return not needs or needs in self.permissions or self.target_sdk < _ACTIVITY_RECOGNITION_SDK
 
     def sees(self, sensor: SensorInfo) -> SensorInfo:
         """Return a sensor as this client's list shows it: with the cap's period if it is capped."""

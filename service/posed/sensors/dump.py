@@ -133,8 +133,8 @@ def _fusion(service: SensorService) -> Iterator[str]:
     nothing = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for name, used, q, b in (
         ("9-axis fusion", clients, quaternion, bias),
-        ("game fusion(no mag)", 0, *nothing),
-        ("geomag fusion (no gyro)", 0, *nothing),
+        ("game fusion(no mag)", _listeners(by_type, SensorType.GAME_ROTATION_VECTOR), *nothing),
+        ("geomag fusion (no gyro)", _listeners(by_type, SensorType.GEOMAGNETIC_ROTATION_VECTOR), *nothing),
     ):
         rate_hz = 1e9 / period_ns if used and period_ns else 0.0
         x, y, z, w = q
@@ -142,6 +142,10 @@ def _fusion(service: SensorService) -> Iterator[str]:
             f"{name} {'enabled' if used else 'disabled'} ({used} clients), gyro-rate={rate_hz:7.2f}Hz, "
             f"q=< {x:g}, {y:g}, {z:g}, {w:g} > ({math.hypot(*q):g}), b=< {b[0]:g}, {b[1]:g}, {b[2]:g} >"
         )
+
+
+def _listeners(by_type: Mapping[SensorType, ActiveSensor], kind: SensorType) -> int:
+    return len(by_type[kind].listeners) if kind in by_type else 0
 
 
 def _bias(gyroscope: ActiveSensor, orientation: Orientation) -> tuple[float, float, float]:

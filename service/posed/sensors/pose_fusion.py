@@ -1,7 +1,7 @@
 """From drained samples to poses: who wants poses, the filter, and the instants they stand on."""
 
 from bisect import bisect_right
-from collections.abc import Hashable
+from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -12,8 +12,8 @@ from posed.fusion import make_filter
 from posed.fusion.filter import OrientationFilter, SensorNoise
 from posed.hal.profile import DeviceProfile
 from posed.sensors.alignment import aligned
+from posed.sensors.fused_events import FusedEvents, PoseMotion
 from posed.sensors.pose_grid import PoseGrid
-from posed.sensors.virtual import VirtualEvents
 
 MIN_POSE_PERIOD_US = 5_000
 MAX_POSE_PERIOD_US = 1_000_000
@@ -42,8 +42,15 @@ class PoseFusion:
     """The filter and its poses. All times are sample time, ns."""
 
     def __init__(
-        self, orientation_filter: OrientationFilter, clock: Clock, position: Position | None, align: bool
+        self,
+        orientation_filter: OrientationFilter,
+        clock: Clock,
+        position: Position | None,
+        align: bool,
+        declination: Callable[[], float],
     ) -> None:
+        self._declination = declination
+        self._motion = PoseMotion()
         self._filter = orientation_filter
         self._align = align
         self._clock = clock
@@ -94,30 +101,32 @@ class PoseFusion:
             if grid is not None:
                 grid.skip(now_ns)
 
-    def fuse(self, events: list[FlatEvent], until_ns: int, wants_virtual: bool) -> dict[int, EventColumn]:
+    def fuse(self, events: list[FlatEvent], until_ns: int, wanted: Collection[SensorType]) -> dict[int, EventColumn]:
         """Feed the filter, stopping at every grid instant up to `until_ns` for a pose.
 
-        Returns the fused sensors' events by handle, one for each accelerometer event, if they are wanted.
+        Returns the events of the wanted fused sensors by handle, one for each accelerometer event.
         """
-        if not self._grids and not wants_virtual:
+        if not self._grids and not wanted:
             return {}
         if events and self._anchor_ns is None:
             self._anchor_ns = events[0][1]
             self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
         started = self._clock.cpu_ns()
         done = 0
-        virtual = VirtualEvents()
-        for instant_ns, row, grid in self._stops(events, until_ns, wants_virtual):
+        # Where true north points is worked out only for those who ask.
+        declination = self._declination() if SensorType.HEADING in wanted else 0.0
+        fused = FusedEvents(wanted, declination, self._motion)
+        for instant_ns, row, grid in self._stops(events, until_ns, bool(wanted)):
             stop = bisect_right(events, instant_ns, done, key=_time_of)
             self._feed(events[done:stop])
             done = stop
             if grid is not None:
                 self._pass_instant(grid)
             elif (orientation := self._filter.orientation()) is not None:
-                virtual.add(instant_ns, events[row][2:], orientation)
+                fused.add(instant_ns, events[row][2:], orientation)
         self._feed(events[done:])
         self.cpu_ns += self._clock.cpu_ns() - started
-        return virtual.columns()
+        return fused.columns()
 
     def take_poses(self) -> list[Pose]:
         """Remove and return the poses of the grid instants passed since the last call, oldest first."""
@@ -139,7 +148,7 @@ class PoseFusion:
         return grid
 
     def _stops(
-        self, events: list[FlatEvent], until_ns: int, wants_virtual: bool
+        self, events: list[FlatEvent], until_ns: int, at_accelerometer: bool
     ) -> list[tuple[int, int, PoseGrid | None]]:
         """Return (instant, row, grid) in time order: poses due (with a grid) and accelerometer events (without)."""
         stops: list[tuple[int, int, PoseGrid | None]] = []
@@ -147,7 +156,7 @@ class PoseFusion:
             if grid is not None:
                 step_ns = grid.period_us * 1000
                 stops += [(instant_ns, -1, grid) for instant_ns in range(grid.next_ns, until_ns + 1, step_ns)]
-        if wants_virtual:
+        if at_accelerometer:
             stops += [(event[1], row, None) for row, event in enumerate(events) if event[0] == SensorType.ACCELEROMETER]
         stops.sort(key=_instant_of)
         return stops

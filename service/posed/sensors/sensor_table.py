@@ -5,26 +5,46 @@ from collections.abc import Hashable, Iterable
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError
 from posed.events import EventBatch, EventColumn, SensorInfo, SensorType
+from posed.fusion.filter import SensorNoise
 from posed.sensors.active_sensor import ActiveSensor
 from posed.sensors.arbitration import BatchParams, arbitrate, clamp_period_ns
 from posed.sensors.device import SensorDevice
-from posed.sensors.virtual import FUSION_INPUTS, LEAD, input_periods_ns, virtual_sensors
+from posed.sensors.virtual import (
+    FUSED,
+    FUSION_INPUTS,
+    LEAD,
+    Computation,
+    VirtualSensor,
+    make_computation,
+    virtual_sensors,
+)
 
 
 class SensorTable:
     """The source's sensors, the virtual ones computed from them, and the dynamic ones, by handle."""
 
-    def __init__(self, device: SensorDevice, clock: Clock) -> None:
+    def __init__(
+        self, device: SensorDevice, clock: Clock, noise: SensorNoise, *, knows_true_north: bool = False
+    ) -> None:
+        """noise: of the device's parts, for the filters of virtual sensors. knows_true_north: as `virtual_sensors`."""
+        self._noise = noise
         self._device = device
         self._clock = clock
         physical = device.sensors
-        virtual = virtual_sensors(physical)
-        self.listed: tuple[SensorInfo, ...] = (*physical, *virtual)
+        virtual = virtual_sensors(physical, knows_true_north=knows_true_north)
+        self._virtual: dict[int, VirtualSensor] = {each.info.handle: each for each in virtual}
+        self._computations: dict[int, Computation] = {}
+        """Made when first wanted, and kept: a counter goes on counting."""
+        self.listed: tuple[SensorInfo, ...] = (*physical, *(each.info for each in virtual))
         """The static list: the source's, then the virtual ones."""
         self.inputs = {info.handle: info.type for info in physical if info.type in FUSION_INPUTS}
         """Types of the sensors that the filter is fed, by handle."""
         self._by_handle = {info.handle: ActiveSensor(info) for info in physical}
-        self._by_handle.update({info.handle: ActiveSensor(info, self._input(LEAD)) for info in virtual})
+        self._by_handle.update({each.info.handle: ActiveSensor(each.info, self._input(LEAD)) for each in virtual})
+        self.fused: frozenset[SensorType] = frozenset()
+        """Types of the fused sensors that somebody wants."""
+        self.computed: list[tuple[int, Computation]] = []
+        """Handles of the other virtual sensors that somebody wants, and what makes their events."""
         self.active: list[ActiveSensor] = []
         """Those that somebody wants, in the order of the list."""
         self.dynamic_changes = 0
@@ -49,7 +69,7 @@ class SensorTable:
         """Note what a sensor is asked for under a key, and of its inputs if it is virtual."""
         self._request(sensor, key, BatchParams(period_ns, latency_ns))
         if sensor.is_virtual:
-            for kind, input_ns in input_periods_ns(period_ns).items():
+            for kind, input_ns in self._virtual[sensor.info.handle].input_periods_ns(period_ns).items():
                 source = self._input(kind)
                 clamped_ns = clamp_period_ns(input_ns // 1000, source.info)
                 self._request(source, key, BatchParams(clamped_ns, latency_ns if source is sensor.lead else None))
@@ -121,3 +141,15 @@ class SensorTable:
 
     def _follow_requests(self) -> None:
         self.active = [each for each in self._by_handle.values() if each.requests]
+        virtual = [each.info for each in self.active if each.is_virtual]
+        self.fused = frozenset(info.type for info in virtual if info.type in FUSED)
+        running = {handle for handle, _ in self.computed}
+        self.computed = [(info.handle, self._computation(info)) for info in virtual if info.type not in FUSED]
+        for handle, computation in self.computed:
+            if handle not in running:
+                computation.restart()
+
+    def _computation(self, info: SensorInfo) -> Computation:
+        if info.handle not in self._computations:
+            self._computations[info.handle] = make_computation(info.type, self._noise)
+        return self._computations[info.handle]

@@ -1,11 +1,11 @@
 """The sensor service: registrations in, events and poses out, one drain of the source at a time."""
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
 from posed.events import Pose, Position, ReportingMode, SensorInfo
-from posed.fusion.filter import OrientationFilter
+from posed.fusion.filter import OrientationFilter, SensorNoise
 from posed.hal.source import SensorSource
 from posed.sensors.active_sensor import ActiveSensor
 from posed.sensors.arbitration import clamp_period_ns
@@ -16,7 +16,7 @@ from posed.sensors.device import SensorDevice
 from posed.sensors.pose_fusion import PoseFusion
 from posed.sensors.registration_log import RegistrationLog, RegistrationRecord
 from posed.sensors.sensor_table import SensorTable
-from posed.sensors.virtual import FUSION_INPUTS
+from posed.sensors.virtual import FUSED, FUSION_INPUTS
 
 # A service this far behind (sample time) was suspended or stopped: to make up for hours would block it for minutes.
 _LONGEST_LAG_NS = 5_000_000_000
@@ -36,13 +36,20 @@ class SensorService:
         position: Position | None = None,
         *,
         aligned: bool = False,
+        declination: Callable[[], float] | None = None,
+        noise: SensorNoise | None = None,
     ) -> None:
-        """Fuse with this filter; `aligned` turns each pose on to its grid instant by the newest angular rate."""
+        """Fuse with this filter.
+
+        aligned: turn each pose on to its grid instant by the newest angular rate. declination: returns that of the
+        place, rad, east positive; without it there is no heading sensor. noise: of the device's parts, for the filters
+        of virtual sensors.
+        """
         self._clock = clock
         self._device = SensorDevice(source, clock)
         self.orientation_filter = orientation_filter
-        self._fusion = PoseFusion(orientation_filter, clock, position, aligned)
-        self._table = SensorTable(self._device, clock)
+        self._fusion = PoseFusion(orientation_filter, clock, position, aligned, declination or (lambda: 0.0))
+        self._table = SensorTable(self._device, clock, noise or SensorNoise(), knows_true_north=declination is not None)
         self._connections: dict[SensorEventConnection, None] = {}
         self.registrations = RegistrationLog()
         self._now_ns = 0
@@ -67,13 +74,18 @@ class SensorService:
         sampling_period_us: us, 0 = fastest; what the connection's client may ask is the least. max_report_latency_us:
         us, 0 = each event as it happens. decimate: have no more than that period of a continuous sensor delivered,
         whatever others ask; Android has no such thing.
-        Raises InvalidArgumentError for an unknown handle, a negative period or latency, or a sensor it already has, and
-        what the source raises, without a trace left.
+        Raises InvalidArgumentError for an unknown handle, a negative period or latency, a sensor it already has or may
+        not use, and what the source raises, without a trace left.
         """
         sensor = self._table[handle]
         if sampling_period_us < 0 or max_report_latency_us < 0:
             raise InvalidArgumentError(
                 f"sampling period {sampling_period_us} us and latency {max_report_latency_us} us must not be negative"
+            )
+        if not connection.client.may_use(sensor.info):
+            raise InvalidArgumentError(
+                f"{connection.client.package_name} lacks {sensor.info.required_permission}, which {sensor.info.name}"
+                " needs; name it among the permissions of its Package"
             )
         if connection in sensor.listeners:
             raise InvalidArgumentError(
@@ -182,7 +194,7 @@ class SensorService:
     @property
     def fusion_clients(self) -> int:
         """How many want what the filter says: the pose, and every listener of a fused sensor."""
-        listeners = sum(len(sensor.listeners) for sensor in self._table.all if sensor.is_virtual)
+        listeners = sum(len(sensor.listeners) for sensor in self._table.all if sensor.info.type in FUSED)
         return listeners + (self._fusion.sampling_period_us is not None)
 
     @property
@@ -282,8 +294,12 @@ class SensorService:
         # A recording that has ended moves no pose on: its last sample is the last thing known.
         end_ns = self._device.end_ns
         until_ns = now_ns if end_ns is None else min(now_ns, end_ns)
-        wants_virtual = any(sensor.is_virtual for sensor in self._table.active)
-        virtual = self._fusion.fuse(batch.flat(self._table.inputs), until_ns, wants_virtual)
+        events = batch.flat(self._table.inputs)
+        virtual = self._fusion.fuse(events, until_ns, self._table.fused)
+        for handle, computation in self._table.computed:
+            column = computation.take(events)
+            if column is not None:
+                virtual[handle] = column
         self._table.take_in((*batch.columns.items(), *virtual.items()))
         self._release_due()
         for handle in batch.flush_completes:
