@@ -141,6 +141,19 @@ def test_events_for_people(shell: Shell) -> None:
     assert all("m/s²" in line and line.endswith("high") for line in lines)
 
 
+def test_what_is_set_is_told(shell: Shell) -> None:
+    shell.run("start")
+    stream = shell.begin("events", "light", "--json")
+    assert stream.stdout is not None
+    assert json.loads(stream.stdout.readline())["values"] == [300]
+    assert shell.run("set", "light", "12").returncode == 0
+    assert json.loads(stream.stdout.readline())["values"] == [12]
+    refused = shell.run("set", "light", "1e9")
+    assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
+    assert "light = 1e+09 is more than its sensor reads; allowed: 0 to 10000" in refused.stderr
+    assert shell.run("set", "gyroscope", "1").returncode == 2
+
+
 def test_an_unknown_sensor_is_answered_with_the_list(shell: Shell) -> None:
     shell.run("start")
     asked = shell.run("events", "thermometer")

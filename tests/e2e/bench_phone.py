@@ -126,6 +126,9 @@ class BenchPhone:
     def prepare(self) -> None:
         pass
 
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        raise InvalidArgumentError("nothing to set")
+
     def next_sample_ns(self, handle: int) -> int | None:
         self._require_phone()
         if not self._is_part(handle):

@@ -71,7 +71,7 @@ class TestSource:
 
     def test_is_a_sensor_source_on_boot_time(self) -> None:
         source: SensorSource = phone()[0]
-        assert [sensor.handle for sensor in source.sensors] == [1, 2, 4, 14, 16, 35]
+        assert [sensor.handle for sensor in source.sensors] == [1, 2, 4, 5, 6, 8, 14, 16, 35]
         assert source.time_map == TimeMap()
         assert source.end_ns is None
 

@@ -162,6 +162,9 @@ class RegularSource:
     def prepare(self) -> None:
         pass
 
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        raise InvalidArgumentError("nothing to set")
+
     def next_sample_ns(self, handle: int) -> int | None:
         self._require_phone()
         if handle not in self._done_ns or self._modes[handle] is not ReportingMode.CONTINUOUS:

@@ -92,6 +92,14 @@ class DynamicSensorCallbackRequest(_message.Message):
     callback: str
     def __init__(self, callback: _Optional[str] = ...) -> None: ...
 
+class SetEnvironmentRequest(_message.Message):
+    __slots__ = ("type", "value")
+    TYPE_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    type: int
+    value: float
+    def __init__(self, type: _Optional[int] = ..., value: _Optional[float] = ...) -> None: ...
+
 class DumpRequest(_message.Message):
     __slots__ = ("offset",)
     OFFSET_FIELD_NUMBER: _ClassVar[int]

@@ -12,6 +12,7 @@ from posed.daemon.clients import ClientRegistry
 from posed.daemon.listeners import Listeners
 from posed.daemon.statistics import PublicationStatistics, process_cpu_ns, voluntary_switches
 from posed.errors import InvalidArgumentError, InvalidStateError
+from posed.events import SensorType
 from posed.fusion.kernel import kernel
 from posed.proto import binder_pb2, events_pb2, sensors_pb2
 from posed.sensors import SensorService
@@ -113,6 +114,14 @@ class SensorServiceStub(Stub):
         self, request: sensors_pb2.DynamicSensorCallbackRequest, caller: Caller
     ) -> binder_pb2.Empty:
         self._dynamic_callbacks.pop((caller.peer, request.callback), None)
+        return binder_pb2.Empty()
+
+    def setEnvironment(self, request: sensors_pb2.SetEnvironmentRequest, caller: Caller) -> binder_pb2.Empty:
+        try:
+            kind = SensorType(request.type)
+        except ValueError:
+            raise InvalidArgumentError(f"sensor type {request.type} is unknown; give one of the sensor list") from None
+        self._service.set_environment(kind, request.value)
         return binder_pb2.Empty()
 
     def dump(self, request: sensors_pb2.DumpRequest, caller: Caller) -> sensors_pb2.DumpReply:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from posed.errors import InvalidArgumentError, ProfileError
-from posed.events import SensorInfo, SensorType
+from posed.events import ReportingMode, SensorInfo, SensorType
 from posed.hal.calibration import Calibration
 from posed.hal.toml_table import TomlTable, close_match
 
@@ -68,10 +68,7 @@ class SensorProfile:
         """
         if sampling_period_ns < 0:
             raise InvalidArgumentError(f"sampling_period_ns = {sampling_period_ns}; allowed: 0 (fastest) or more")
-        for rate in self.rates_hz:
-            if exact_period_ns(rate).samples_in(sampling_period_ns) >= 1:
-                return rate
-        return self.rates_hz[-1]
+        return _configured_rate_hz(self.rates_hz, sampling_period_ns)
 
     def configured_period_ns(self, sampling_period_ns: int) -> int:
         """Return the period (ns) of `configured_rate_hz`, rounded up so that asking for it again gives the same rate.
@@ -93,6 +90,57 @@ class SensorProfile:
     def max_delay_us(self) -> int:
         """The period of the slowest rate in whole microseconds, rounded up: truncated, 15 Hz would turn into 50."""
         return -(-exact_period_ns(self.rates_hz[0]).rounded_up() // 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class AmbientPart:
+    """A part that reads one value of what surrounds the phone: pressure (hPa), light (lux) or proximity (cm).
+
+    rates_hz: the output rates of a pressure sensor; the others tell of changes and have none. noise_density: white
+    noise, unit/sqrt(Hz).
+    """
+
+    type: SensorType
+    name: str
+    vendor: str
+    version: int
+    max_range: float
+    resolution: float
+    power_ma: float
+    rates_hz: tuple[float, ...] = ()
+    noise_density: float = 0.0
+
+    @property
+    def mode(self) -> ReportingMode:
+        """Whether it samples or tells of changes."""
+        return ReportingMode.CONTINUOUS if self.rates_hz else ReportingMode.ON_CHANGE
+
+    def configured_rate_hz(self, sampling_period_ns: int) -> float:
+        """Return the slowest rate (Hz) that is not slower than the period asked for, else the fastest there is."""
+        return _configured_rate_hz(self.rates_hz, sampling_period_ns)
+
+    def configured_period_ns(self, sampling_period_ns: int) -> int:
+        """Return the period (ns) that a request gets: of a part that tells of changes, the one asked for."""
+        if not self.rates_hz:
+            return sampling_period_ns
+        return exact_period_ns(self.configured_rate_hz(sampling_period_ns)).rounded_up()
+
+    def info(self) -> SensorInfo:
+        """Return the sensor as Android lists it."""
+        return SensorInfo(
+            handle=int(self.type),
+            type=self.type,
+            name=self.name,
+            vendor=self.vendor,
+            version=self.version,
+            max_range=self.max_range,
+            resolution=self.resolution,
+            power_ma=self.power_ma,
+            min_delay_us=exact_period_ns(self.rates_hz[-1]).until(1) // 1000 if self.rates_hz else 0,
+            max_delay_us=-(-exact_period_ns(self.rates_hz[0]).rounded_up() // 1000) if self.rates_hz else 0,
+            reporting_mode=self.mode,
+            wake_up=self.type is SensorType.PROXIMITY,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +166,8 @@ class DeviceProfile:
     calibration: Mapping[SensorType, Calibration]
     camera_fov_deg: float = 67.0
     """Field of view of the back camera along the longer side of its image; the default is a 26 mm lens's."""
+    ambient: tuple[AmbientPart, ...] = ()
+    """Its pressure, light and proximity sensors, as far as it has them."""
     screen_rotation_deg: int = 0
     """How the phone is used: 0, 90, 180 or 270 from its natural orientation (Display.getRotation)."""
 
@@ -189,6 +239,13 @@ def exact_period_ns(rate_hz: float) -> ExactPeriod:
     return ExactPeriod(10**15 // common, microhertz // common)
 
 
+def _configured_rate_hz(rates_hz: tuple[float, ...], sampling_period_ns: int) -> float:
+    for rate in rates_hz:
+        if exact_period_ns(rate).samples_in(sampling_period_ns) >= 1:
+            return rate
+    return rates_hz[-1]
+
+
 def profile_names() -> tuple[str, ...]:
     """Return the names of the profiles that are shipped, sorted."""
     return tuple(sorted(file.name.removesuffix(".toml") for file in _SHIPPED.iterdir() if file.name.endswith(".toml")))
@@ -247,6 +304,9 @@ def _parse(file: str, content: bytes) -> DeviceProfile:
     name = root.text("name")
     description = root.text("description")
     sensors = {kind: _read_sensor(kind, root.table(kind.name.lower(), required=True)) for kind in UNCALIBRATED_TYPE}
+    ambient = tuple(
+        _read_ambient(kind, table) for kind in _AMBIENT if not (table := root.table(kind.name.lower())).is_empty
+    )
     tables = root.table("calibration")
     calibration = {kind: _read_calibration(kind, tables.table(kind.name.lower())) for kind in UNCALIBRATED_TYPE}
     camera, screen = root.table("camera"), root.table("screen")
@@ -258,7 +318,31 @@ def _parse(file: str, content: bytes) -> DeviceProfile:
         raise screen.refusal("rotation_deg", rotation_deg, "0, 90, 180 or 270")
     for table in (tables, camera, screen, root):
         table.finish()
-    return DeviceProfile(name, description, sensors, calibration, fov_deg, rotation_deg)
+    return DeviceProfile(name, description, sensors, calibration, fov_deg, ambient, rotation_deg)
+
+
+_AMBIENT = (SensorType.LIGHT, SensorType.PRESSURE, SensorType.PROXIMITY)
+
+
+def _read_ambient(kind: SensorType, table: TomlTable) -> AmbientPart:
+    samples = kind is SensorType.PRESSURE
+    part = AmbientPart(
+        type=kind,
+        name=table.text("name"),
+        vendor=table.text("vendor"),
+        version=table.integer("version", low=1, default=1),
+        max_range=table.number("max_range", positive=True),
+        resolution=table.number("resolution", positive=True),
+        power_ma=table.number("power_ma"),
+        rates_hz=table.ascending("rates_hz") if samples else (),
+        noise_density=table.number("noise_density", default=0.0) if samples else 0.0,
+    )
+    table.finish()
+    if part.resolution > part.max_range:
+        raise table.refusal("resolution", part.resolution, f"at most max_range, {part.max_range}")
+    if samples and part.rates_hz[-1] > _HIGHEST_RATE_HZ:
+        raise table.refusal("rates_hz", list(part.rates_hz), f"rates up to {_HIGHEST_RATE_HZ} Hz")
+    return part
 
 
 def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:

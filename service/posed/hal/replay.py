@@ -163,6 +163,10 @@ class ReplaySource:
     def prepare(self) -> None:
         """All is there: does nothing."""
 
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        """Raise InvalidArgumentError: what surrounded a recorded phone is as it was."""
+        raise InvalidArgumentError(f"{kind.name.lower()} cannot be set: this is a recording; start with --source sim")
+
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if the sensor is off or the replay at its end.
 

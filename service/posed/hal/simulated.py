@@ -11,6 +11,7 @@ from posed.hal.calibration import Calibration
 from posed.hal.motion import MotionScript
 from posed.hal.profile import UNCALIBRATED_TYPE, DeviceProfile, exact_period_ns
 from posed.hal.sensor_model import BLOCK_SAMPLES, THESSALONIKI, SensorModel, Site
+from posed.hal.surroundings import Surroundings
 
 
 class SimulatedPhone:
@@ -32,6 +33,7 @@ class SimulatedPhone:
             for kind, part in profile.sensors.items()
         }
         self._rates = {info.handle: profile.sensor(info.handle).rates_hz[-1] for info in profile.sensor_infos()}
+        self._surroundings = Surroundings(profile.ambient, seed)
         self._streams: dict[int, _Stream] = {}
         self._flushes: list[int] = []
         self._zero_ns: int | None = None
@@ -39,7 +41,8 @@ class SimulatedPhone:
 
     @property
     def sensors(self) -> tuple[SensorInfo, ...]:
-        return self._profile.sensor_infos()
+        infos = (*self._profile.sensor_infos(), *self._surroundings.infos)
+        return tuple(sorted(infos, key=lambda info: info.handle))
 
     @property
     def time_map(self) -> TimeMap:
@@ -54,11 +57,14 @@ class SimulatedPhone:
 
         Raises InvalidArgumentError for an unknown handle.
         """
-        self._profile.sensor(handle)
+        if handle in self._surroundings:
+            self._surroundings.activate(handle, enabled, max(self._clock.now_ns(), self._drained_ns))
+        else:
+            self._profile.sensor(handle)
         if not enabled:
             self._streams.pop(handle, None)
             self._flushes = [asked for asked in self._flushes if asked != handle]
-        elif handle not in self._streams:
+        elif handle not in self._streams and handle not in self._surroundings:
             self._start(handle, max(self._clock.now_ns(), self._drained_ns))
 
     def batch(self, handle: int, sampling_period_ns: int, max_report_latency_ns: int) -> int:
@@ -67,9 +73,11 @@ class SimulatedPhone:
         Samples are made when they are drained, so the report latency is the caller's affair. Raises
         InvalidArgumentError for an unknown handle or a negative period or latency.
         """
-        part = self._profile.sensor(handle)
         if max_report_latency_ns < 0:
             raise InvalidArgumentError(f"max_report_latency_ns = {max_report_latency_ns}; allowed: 0 or more")
+        if handle in self._surroundings:
+            return self._surroundings.batch(handle, sampling_period_ns, self._drained_ns)
+        part = self._profile.sensor(handle)
         rate_hz = part.configured_rate_hz(sampling_period_ns)
         if rate_hz != self._rates[handle]:
             self._rates[handle] = rate_hz
@@ -87,6 +95,7 @@ class SimulatedPhone:
         columns = {
             handle: stream.take(until_ns) for handle, stream in self._streams.items() if stream.next_ns <= until_ns
         }
+        columns.update(self._surroundings.drain(until_ns))
         self._drained_ns = max(self._drained_ns, until_ns)
         if not self._flushes:
             return EventBatch(columns)
@@ -98,6 +107,7 @@ class SimulatedPhone:
         self._drained_ns = max(self._clock.now_ns(), self._drained_ns)
         for handle in self._streams:
             self._start(handle, self._drained_ns)
+        self._surroundings.resume(self._drained_ns)
 
     def prepare(self) -> None:
         """Make the blocks of samples needed soon: each takes milliseconds, by which a pose would else be late."""
@@ -107,7 +117,10 @@ class SimulatedPhone:
     def next_sample_ns(self, handle: int) -> int | None:
         """Return the timestamp of the next sample of a sensor, None if it is not active."""
         stream = self._streams.get(handle)
-        return None if stream is None else stream.next_ns
+        return self._surroundings.next_sample_ns(handle) if stream is None else stream.next_ns
+
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        self._surroundings.set(kind, value, max(self._clock.now_ns(), self._drained_ns + 1))
 
     def truth(self, timestamp_ns: int) -> Truth | None:
         """Return the script's attitude and position at `timestamp_ns`, None before the script began."""
@@ -120,7 +133,10 @@ class SimulatedPhone:
         return Truth(timestamp_ns, quaternion, self._site.declination, (east, north, up))
 
     def _active(self, handle: int) -> None:
-        self._profile.sensor(handle)
+        if self._surroundings.is_active(handle):
+            return
+        if handle not in self._surroundings:
+            self._profile.sensor(handle)
         if handle not in self._streams:
             name = SensorType(handle).name.lower()
             raise InvalidArgumentError(f"sensor handle {handle} ({name}) is not active; activate it before a flush")

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from posed.clock import TimeMap
-from posed.events import EventBatch, SensorInfo, Truth
+from posed.events import EventBatch, SensorInfo, SensorType, Truth
 
 
 class SensorSource(Protocol):
@@ -56,6 +56,12 @@ class SensorSource(Protocol):
 
     def prepare(self) -> None:
         """Do now, while nobody waits, what the next drains would have to do; they yield the same without it."""
+
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        """Set what an ambient sensor reads from now on, in its unit (pressure hPa, light lux, proximity cm).
+
+        Raises InvalidArgumentError where that is not for anyone to set, or for a value that the sensor cannot read.
+        """
 
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if none is expected."""

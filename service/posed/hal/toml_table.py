@@ -86,6 +86,11 @@ class TomlTable:
             raise self.refusal(key, value, "a table")
         return TomlTable(self._file, self._name(key), value)
 
+    @property
+    def is_empty(self) -> bool:
+        """True if it has no key, as one that is absent."""
+        return not self._values
+
     def finish(self) -> None:
         """Refuse every key that was not read."""
         for key in self._values:

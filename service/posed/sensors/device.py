@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from posed.clock import Clock, TimeMap
 from posed.errors import SourceLostError
-from posed.events import EventBatch, SensorInfo
+from posed.events import EventBatch, SensorInfo, SensorType
 from posed.hal.source import SensorSource
 from posed.sensors.arbitration import BatchParams
 from posed.sensors.quantisation import Quantiser, as_listed
@@ -95,6 +95,10 @@ class SensorDevice:
                 self._flushing.remove(handle)
                 flushes.append(handle)
         return EventBatch(columns, flushes, connected, batch.disconnected)
+
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        """Set what an ambient sensor reads from now on; raises as the source does."""
+        self._source.set_environment(kind, value)
 
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of an active sensor is due, None if none is expected."""

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
-from posed.events import Pose, Position, ReportingMode, SensorInfo
+from posed.events import Pose, Position, ReportingMode, SensorInfo, SensorType
 from posed.fusion.filter import OrientationFilter, SensorNoise
 from posed.hal.source import SensorSource
 from posed.sensors.active_sensor import ActiveSensor
@@ -185,6 +185,14 @@ class SensorService:
         self.advance()
         self._fusion.withdraw(key, self._sample_now_ns())
         self._table.request_inputs(_POSE, self._fusion.sampling_period_us)
+
+    def set_environment(self, kind: SensorType, value: float) -> None:
+        """Set what an ambient sensor of the source reads from now on, in its unit.
+
+        Raises InvalidArgumentError where that is not for anyone to set, or for a value that the sensor cannot read.
+        """
+        self.advance()
+        self._device.set_environment(kind, value)
 
     @property
     def pose_sampling_period_us(self) -> int | None:
