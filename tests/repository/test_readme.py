@@ -79,7 +79,7 @@ def _serve(words: list[str]) -> None:
             process.kill()
 
 
-@pytest.mark.parametrize("program", _PROGRAMS, ids=["poses", "events", "stream"])
+@pytest.mark.parametrize("program", _PROGRAMS, ids=["poses", "events", "stream", "android"])
 def test_the_programs_print_what_they_promise(desk: Path, program: str) -> None:
     process = subprocess.Popen(
         [sys.executable, "-u", "-c", program],
@@ -101,4 +101,4 @@ def test_the_install_commands_are_those_that_ci_runs() -> None:
     ci = (Path(__file__).parents[2] / ".ci" / "run").read_text()
     assert "-e '.[all,test]'" in ci
     assert _COMMANDS
-    assert len(_PROGRAMS) == 3
+    assert len(_PROGRAMS) == 4

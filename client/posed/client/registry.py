@@ -110,7 +110,7 @@ class ListenerRegistry:
             queue.accuracies.clear()
             for handle, registration in list(queue.registrations.items()):
                 try:
-                    self._enable(queue, registration)
+                    self._enable_or_stream(queue, registration)
                 except RemoteError as error:
                     # The daemon that returned may have another phone: what it lacks is no reason to lose the rest.
                     _log.error("sensor %d of %s is not registered any more: %s", handle, queue.name, error)

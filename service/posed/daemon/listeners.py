@@ -20,7 +20,7 @@ _EVENTS_A_MESSAGE = 800
 # As SensorEventConnection.cpp: a listener that does not read is not to fill the log.
 _DROP_LOG_INTERVAL_NS = 2_000_000_000
 # ZeroMQ does not tell when a full queue has room again.
-_RETRY_S = 0.02
+RETRY_S = 0.02
 
 
 @dataclass(slots=True)
@@ -103,7 +103,7 @@ class Listeners:
         for listener in list(self._listeners.values()):
             while listener.waits:
                 if not self._send(listener, header):
-                    self.retry_s = _RETRY_S
+                    self.retry_s = RETRY_S
                     self._drop_overflow(listener)
                     break
             self.forget_if_idle(listener)

@@ -9,7 +9,7 @@ from posed.binder.stub import Caller, Stub
 from posed.clock import Clock
 from posed.daemon import encoding
 from posed.daemon.clients import ClientRegistry
-from posed.daemon.listeners import Listeners
+from posed.daemon.listeners import RETRY_S, Listeners
 from posed.daemon.statistics import PublicationStatistics, process_cpu_ns, voluntary_switches
 from posed.errors import InvalidArgumentError, InvalidStateError
 from posed.events import SensorType
@@ -42,23 +42,31 @@ class SensorServiceStub(Stub):
         self._parcels_refused = parcels_refused
         self._listeners = Listeners(service, clock)
         self._dynamic_callbacks: dict[tuple[Peer, str], Proxy] = {}
-        self._dynamic_changes_told = 0
+        self._dynamic_changes_told: dict[tuple[Peer, str], int] = {}
+        """What each callback knows of, by the service's count of changes."""
         self._dumps: dict[Peer, str] = {}
         self._watched: set[Peer] = set()
 
     @property
     def retry_s(self) -> float | None:
         """When to deliver again though nothing is due, seconds from now; None if nothing is held up."""
+        if self._listeners.retry_s is None and self._untold():
+            return RETRY_S
         return self._listeners.retry_s
 
     def deliver(self, header: Callable[[int], events_pb2.DeliveryHeader]) -> None:
         """Send what waits for listeners and callbacks; header makes a message's from its sequence."""
         self._listeners.deliver(header)
-        if self._service.dynamic_changes != self._dynamic_changes_told:
-            self._dynamic_changes_told = self._service.dynamic_changes
-            message = encoding.sensor_list(self._service.dynamic_sensors)
-            for callback in self._dynamic_callbacks.values():
-                callback.onDynamicSensorsChanged(message)
+        for key in self._untold():
+            client = self._clients.of(key[0])
+            message = encoding.sensor_list(client.sees(info) for info in self._service.dynamic_sensors)
+            # What a full socket refuses is tried again: the list, not the change, is told.
+            if self._dynamic_callbacks[key].onDynamicSensorsChanged(message):
+                self._dynamic_changes_told[key] = self._service.dynamic_changes
+
+    def _untold(self) -> list[tuple[Peer, str]]:
+        changes = self._service.dynamic_changes
+        return [key for key in self._dynamic_callbacks if self._dynamic_changes_told[key] != changes]
 
     # ISensorService
 
@@ -107,13 +115,16 @@ class SensorServiceStub(Stub):
         if not request.callback:
             raise InvalidArgumentError("the request names no callback object; give its name")
         self._watch(caller.peer)
-        self._dynamic_callbacks[caller.peer, request.callback] = caller.peer.proxy(_DYNAMIC_CALLBACK, request.callback)
+        key = (caller.peer, request.callback)
+        self._dynamic_callbacks[key] = caller.peer.proxy(_DYNAMIC_CALLBACK, request.callback)
+        self._dynamic_changes_told.setdefault(key, self._service.dynamic_changes)
         return binder_pb2.Empty()
 
     def unregisterDynamicSensorCallback(
         self, request: sensors_pb2.DynamicSensorCallbackRequest, caller: Caller
     ) -> binder_pb2.Empty:
         self._dynamic_callbacks.pop((caller.peer, request.callback), None)
+        self._dynamic_changes_told.pop((caller.peer, request.callback), None)
         return binder_pb2.Empty()
 
     def setEnvironment(self, request: sensors_pb2.SetEnvironmentRequest, caller: Caller) -> binder_pb2.Empty:
@@ -192,6 +203,7 @@ class SensorServiceStub(Stub):
         self._listeners.forget_all_of(peer)
         for key in [key for key in self._dynamic_callbacks if key[0] is peer]:
             del self._dynamic_callbacks[key]
+            del self._dynamic_changes_told[key]
 
 
 _DYNAMIC_CALLBACK = sensors_pb2.DESCRIPTOR.services_by_name["IDynamicSensorCallback"]
