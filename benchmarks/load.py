@@ -84,7 +84,8 @@ def count(numbers: list[int]) -> dict[str, Any]:
             self.count = self.disorder = 0
             self.last: dict[int, int] = {}
             self.manager = SensorManager(package=Package(f"com.example.client{number:02d}"))
-            sensors = self.manager.get_sensor_list()
+            listed = self.manager.get_sensor_list()
+            sensors = [each for each in listed if each.reporting_mode == Sensor.REPORTING_MODE_CONTINUOUS]
             if number not in (1, 25):  # these have all there are
                 sensors = [sensors[(number + k) % len(sensors)] for k in range(2)]
             for sensor in sensors:

@@ -106,6 +106,9 @@ class Sensors(Stub):
     def unregisterDynamicSensorCallback(self, request: Any, caller: Caller) -> Any:
         return EMPTY
 
+    def setEnvironment(self, request: Any, caller: Caller) -> Any:
+        return EMPTY
+
     def dump(self, request: Any, caller: Caller) -> Any:
         return sensors_pb2.DumpReply()
 

@@ -14,6 +14,7 @@ from posed.client import (
     SENSOR_DELAY_NORMAL,
     SENSOR_DELAY_UI,
     Package,
+    Sensor,
     SensorEvent,
     SensorManager,
 )
@@ -30,7 +31,8 @@ class CountingClient:
         self.name = f"com.example.client{number:02d}"
         self.times: dict[int, list[int]] = {}
         self.manager = SensorManager(package=Package(self.name))
-        sensors = self.manager.get_sensor_list()
+        listed = self.manager.get_sensor_list()
+        sensors = [each for each in listed if each.reporting_mode == Sensor.REPORTING_MODE_CONTINUOUS]
         if number not in _EVERYTHING:
             sensors = [sensors[number % len(sensors)]]
         for sensor in sensors:

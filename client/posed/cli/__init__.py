@@ -26,7 +26,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "watch": ("posed.cli.watch", "show the fused pose as it comes"),
     "sensors": ("posed.cli.sensors", "list the sensors"),
     "events": ("posed.cli.events", "print a sensor's events as they come"),
-    "set": ("posed.cli.set", "set what the simulated phone's light, pressure or proximity sensor reads"),
+    "set": ("posed.cli.set", "set what surrounds the simulated phone, such as light"),
     "dumpsys": ("posed.cli.dumpsys", "print the state of the sensor service, as Android does"),
     "fuse": ("posed.cli.fuse", "turn a recording into poses, without a daemon"),
     "evaluate": ("posed.cli.evaluate", "compare filters on recordings with truth"),

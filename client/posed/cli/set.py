@@ -8,6 +8,7 @@ from posed.client import Sensor
 from posed.proto import sensors_pb2
 
 _TYPES = {"light": Sensor.TYPE_LIGHT, "pressure": Sensor.TYPE_PRESSURE, "proximity": Sensor.TYPE_PROXIMITY}
+_UNITS = {"light": "lx", "pressure": "hPa", "proximity": "cm"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,6 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
         sensor_service(connection).setEnvironment(
             sensors_pb2.SetEnvironmentRequest(type=_TYPES[arguments.sensor], value=arguments.value)
         )
+    print(f"{arguments.sensor} is {arguments.value:g} {_UNITS[arguments.sensor]}")
     return 0
 
 
