@@ -15,7 +15,7 @@ from posed.events import SensorType
 from posed.fusion import make_filter
 from posed.fusion.adaptive import AdaptiveFilter
 from posed.fusion.adaptive_state import AdaptiveState
-from posed.fusion.held import MAX_HELD
+from posed.fusion.event_arrays import MAX_HELD
 
 FORMS = st.sampled_from(["dcm-adaptive", "game", "geomag"])
 

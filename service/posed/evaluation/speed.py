@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from posed.clock import BootClock
+from posed.evaluation.rates import event_arrays
 from posed.evaluation.trial import INPUTS
 from posed.events import EventBatch, EventColumn, Float64Array, SensorType
 from posed.fusion.filter import OrientationFilter
@@ -40,7 +41,7 @@ def work(make: Callable[[], OrientationFilter], batch: EventBatch) -> Callable[[
     if isinstance(each, PacedFilter):
         paced, samples = each, _at_gyroscope(batch)
         return lambda: paced.update_synchronous(*samples)
-    events = batch.flat({int(kind): kind for kind in INPUTS})
+    events = event_arrays(batch)
     return lambda: each.update_batch(events)
 
 

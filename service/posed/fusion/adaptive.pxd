@@ -8,7 +8,7 @@ from posed.fusion.adaptive_iron cimport HardIron, IronState
 from posed.fusion.adaptive_state cimport AdaptiveState
 from posed.fusion.adaptive_tilt cimport Tilt, TiltState
 from posed.fusion.direction_cosines cimport DirectionCosines
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport EventArrays, HeldEvents
 from posed.fusion.rest cimport RestBias, RestState
 from posed.fusion.three_state cimport ThreeState
 
@@ -56,7 +56,10 @@ cdef class AdaptiveFilter:
     cdef HardIron _iron
     cdef Heading _heading
 
-    @cython.locals(sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double)
+    @cython.locals(
+        sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double,
+        rows=EventArrays, k=Py_ssize_t,
+    )
     cpdef update_batch(self, events)
 
     @cython.locals(s=AdaptiveState, held=HeldEvents, newest=cython.longlong, norm2=double, largest=double)

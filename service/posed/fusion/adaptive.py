@@ -27,7 +27,7 @@ from posed.fusion.adaptive_iron import HardIron
 from posed.fusion.adaptive_state import AdaptiveParams, AdaptiveState
 from posed.fusion.adaptive_tilt import Tilt
 from posed.fusion.direction_cosines import DirectionCosines
-from posed.fusion.held import MAX_HELD
+from posed.fusion.event_arrays import MAX_HELD, EventArrays
 from posed.fusion.rest import RestBias
 from posed.fusion.saved import filled, plain
 
@@ -107,7 +107,12 @@ class AdaptiveFilter:
         self._take(int(sensor_type), int(timestamp_ns), float(x), float(y), float(z))
 
     def update_batch(self, events: Iterable[FlatEvent]) -> None:
-        """Take events in the order given, each as by `update`."""
+        """Take events in the order given, each as by `update`; EventArrays are taken fastest."""
+        if isinstance(events, EventArrays):
+            rows = events
+            for k in range(rows.count):
+                self._take(rows.sensor_type[k], rows.timestamp_ns[k], rows.x[k], rows.y[k], rows.z[k])
+            return
         for sensor_type, timestamp_ns, x, y, z in events:
             self._take(sensor_type, timestamp_ns, x, y, z)
 

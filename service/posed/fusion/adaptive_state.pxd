@@ -7,7 +7,7 @@ from posed.fusion.adaptive_interval cimport IntervalState
 from posed.fusion.adaptive_iron cimport IronState
 from posed.fusion.adaptive_tilt cimport TiltState
 from posed.fusion.direction_cosines cimport DirectionCosines
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport HeldEvents
 from posed.fusion.rest cimport RestState
 
 @cython.final

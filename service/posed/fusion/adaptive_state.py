@@ -11,7 +11,7 @@ from posed.fusion.adaptive_interval import IntervalParams, IntervalState
 from posed.fusion.adaptive_iron import IronParams, IronState
 from posed.fusion.adaptive_tilt import TiltParams, TiltState
 from posed.fusion.direction_cosines import DirectionCosines
-from posed.fusion.held import HeldEvents
+from posed.fusion.event_arrays import HeldEvents
 from posed.fusion.rest import RestParams, RestState
 
 _MAX_DELAY_S = 0.1

@@ -3,7 +3,7 @@ cimport cython
 from posed.fusion.dcm_state cimport DcmState
 from posed.fusion.direction_cosines cimport DirectionCosines
 from posed.fusion.gate cimport MagneticGate
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport EventArrays, HeldEvents
 from posed.fusion.rest cimport RestBias, RestState
 
 cdef extern from "math.h":
@@ -40,7 +40,10 @@ cdef class DcmFilter:
     cdef RestBias _rest
     cdef MagneticGate _gate
 
-    @cython.locals(sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double)
+    @cython.locals(
+        sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double,
+        rows=EventArrays, k=Py_ssize_t,
+    )
     cpdef update_batch(self, events)
 
     cdef void _take(self, long long sensor_type, long long t, double x, double y, double z) noexcept

@@ -21,8 +21,8 @@ from typing import Any
 from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
 from posed.fusion.dcm_state import DcmParams, DcmState
+from posed.fusion.event_arrays import MAX_HELD, EventArrays
 from posed.fusion.gate import MagneticGate
-from posed.fusion.held import MAX_HELD
 from posed.fusion.rest import RestBias
 
 __all__ = ["DcmFilter", "DcmParams"]
@@ -84,7 +84,12 @@ class DcmFilter:
         self._take(int(sensor_type), int(timestamp_ns), float(x), float(y), float(z))
 
     def update_batch(self, events: Iterable[FlatEvent]) -> None:
-        """Take events in the order given, each as by `update`."""
+        """Take events in the order given, each as by `update`; EventArrays are taken fastest."""
+        if isinstance(events, EventArrays):
+            rows = events
+            for k in range(rows.count):
+                self._take(rows.sensor_type[k], rows.timestamp_ns[k], rows.x[k], rows.y[k], rows.z[k])
+            return
         for sensor_type, timestamp_ns, x, y, z in events:
             self._take(sensor_type, timestamp_ns, x, y, z)
 

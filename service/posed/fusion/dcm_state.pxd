@@ -2,7 +2,7 @@ cimport cython
 
 from posed.fusion.direction_cosines cimport DirectionCosines
 from posed.fusion.gate cimport GateState
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport HeldEvents
 from posed.fusion.rest cimport RestState
 
 @cython.final

@@ -5,9 +5,9 @@ from typing import Any
 
 from posed.events import STANDARD_GRAVITY
 from posed.fusion.direction_cosines import DirectionCosines
+from posed.fusion.event_arrays import HeldEvents
 from posed.fusion.filter import SensorNoise, require_positive
 from posed.fusion.gate import GateParams, GateState
-from posed.fusion.held import HeldEvents
 from posed.fusion.rest import RestParams, RestState
 from posed.fusion.saved import filled, plain
 
