@@ -24,7 +24,7 @@ PACKAGE = "posed.fusion"
 MODULES = [
     *("direction_cosines", "event_arrays", "rest", "gate", "dcm_state", "dcm", "three_state"),
     *("adaptive_interval", "adaptive_tilt", "adaptive_bias", "adaptive_field", "adaptive_iron", "adaptive_heading"),
-    *("adaptive_state", "adaptive"),
+    *("adaptive_repeats", "adaptive_state", "adaptive_corrections", "adaptive"),
 ]
 
 _FOLDER = Path("service", *PACKAGE.split("."))

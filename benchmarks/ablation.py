@@ -101,8 +101,8 @@ def held_out(data: Path) -> None:
     """
     halves: dict[str, list[tuple[Trial, ModeName, list[FlatEvent]]]] = {"A": [], "B": []}
     for which, cases in halves.items():
-        for name in ("broad", "smartphone-attitude"):
-            for path in half(find_trials([data / name]), which):
+        for folder in ("broad", "smartphone-attitude"):
+            for path in half(find_trials([data / folder]), which):
                 trial = load_trial(path)
                 cases += [(trial, mode, mode_events(trial, mode)) for mode in ("GAME", "NORMAL")]
 
@@ -118,15 +118,15 @@ def held_out(data: Path) -> None:
     for fitted, tested in (("A", "B"), ("B", "A")):
         default = chosen = AdaptiveParams()
         moved: dict[str, float] = {}
-        for path, value in numbers(default):
-            if path in FITTED:
-                tried = [changed(chosen, {path: factor * value}) for factor in FACTORS]
+        for name, value in numbers(default):
+            if name in FITTED:
+                tried = [changed(chosen, {name: factor * value}) for factor in FACTORS]
                 costs = [cost(params, fitted) for params in tried]
                 best = int(np.argmin(costs))
                 chosen = tried[best]
-                moved[path] = FACTORS[best]
-                print(fitted, path, FACTORS[best], f"{costs[best]:.3f}", file=sys.stderr, flush=True)
-        print(f"fixed on {fitted}: " + ", ".join(f"{path} * {f}" for path, f in moved.items() if f != 1.0))
+                moved[name] = FACTORS[best]
+                print(fitted, name, FACTORS[best], f"{costs[best]:.3f}", file=sys.stderr, flush=True)
+        print(f"fixed on {fitted}: " + ", ".join(f"{name} * {f}" for name, f in moved.items() if f != 1.0))
         for which in (fitted, tested):
             own, shipped = means(chosen, which), means(default, which)
             cells = (

@@ -4,15 +4,20 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 from posed.errors import InvalidArgumentError
+from posed.events import FilterStatus
 from posed.fusion.adaptive_bias import BiasParams, BiasState
 from posed.fusion.adaptive_field import FieldParams, FieldState
 from posed.fusion.adaptive_heading import HeadingParams, HeadingState
 from posed.fusion.adaptive_interval import IntervalParams, IntervalState
 from posed.fusion.adaptive_iron import IronParams, IronState
+from posed.fusion.adaptive_repeats import Repeats
 from posed.fusion.adaptive_tilt import TiltParams, TiltState
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.event_arrays import HeldEvents
 from posed.fusion.rest import RestParams, RestState
+
+_GAP = int(FilterStatus.GAP)
+_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 _MAX_DELAY_S = 0.1
 """A measurement later than this is given up."""
@@ -67,8 +72,7 @@ class AdaptiveState:
 
     matrix turns device vectors into the levelled frame, which has a heading of its own, at start_ns: the start of the
     newest gyroscope interval. Times in ns, each valid only with its flag; of `acc_ns` and `mag_ns` the newest sample,
-    of `acc_used_ns` and `mag_used_ns` the newest not refused. `*_same`: samples that repeated the sensor's last value,
-    `*_same_s`: s of motion since that value came. held: measurements that wait for theirs.
+    of `acc_used_ns` and `mag_used_ns` the newest not refused. held: measurements that wait for theirs.
     """
 
     matrix: DirectionCosines = field(default_factory=DirectionCosines)
@@ -84,30 +88,18 @@ class AdaptiveState:
     ahead: bool = False
     has_gyro: bool = False
     gyro_ns: int = 0
-    gyro_same: int = 0
-    gyro_same_s: float = 0.0
+    gyro_repeats: Repeats = field(default_factory=Repeats)
     unsteady: bool = False
     """The newest acceleration differs from the one before by more than rounding: the stream has noise, or shakes."""
-    gyro_x: float = 0.0
-    gyro_y: float = 0.0
-    gyro_z: float = 0.0
     gyro_lost: bool = False
     has_acc: bool = False
     acc_ns: int = 0
     acc_used_ns: int = 0
-    acc_same: int = 0
-    acc_same_s: float = 0.0
-    acc_x: float = 0.0
-    acc_y: float = 0.0
-    acc_z: float = 0.0
+    acc_repeats: Repeats = field(default_factory=Repeats)
     has_mag: bool = False
     mag_ns: int = 0
     mag_used_ns: int = 0
-    mag_same: int = 0
-    mag_same_s: float = 0.0
-    mag_x: float = 0.0
-    mag_y: float = 0.0
-    mag_z: float = 0.0
+    mag_repeats: Repeats = field(default_factory=Repeats)
     earth_gap: bool = False
     """No field has been judged since a gap."""
     free_fall: bool = False
@@ -130,3 +122,13 @@ class AdaptiveState:
         state.bias.estimate.start(params.bias.std**2)
         state.iron.estimate.start(params.iron.std**2)
         return state
+
+    def flag_gap(self) -> None:
+        """Count a gap or a sample out of order, and have the next pose say so."""
+        self.gaps += 1
+        self.events |= _GAP
+
+    def flag_bad_sample(self) -> None:
+        """Count a sample refused, and have the next pose say so."""
+        self.bad_samples += 1
+        self.events |= _BAD_SAMPLE
