@@ -1,9 +1,7 @@
 """What the adaptive DCM filter is told (AdaptiveParams) and all that it remembers (AdaptiveState)."""
 
 from dataclasses import dataclass, field
-from math import isfinite
 
-from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus
 from posed.fusion.adaptive_bias import BiasParams, BiasState
 from posed.fusion.adaptive_field import FieldParams, FieldState
@@ -14,13 +12,11 @@ from posed.fusion.adaptive_repeats import Repeats
 from posed.fusion.adaptive_tilt import TiltParams, TiltState
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.event_arrays import HeldEvents
+from posed.fusion.filter import require_delays, require_positive
 from posed.fusion.rest import RestParams, RestState
 
 _GAP = int(FilterStatus.GAP)
 _BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
-
-_MAX_DELAY_S = 0.1
-"""A measurement later than this is given up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +35,11 @@ class AdaptiveParams:
     iron: IronParams = field(default_factory=IronParams)
     heading: HeadingParams = field(default_factory=HeadingParams)
     gyro_delay_s: float = 0.003
-    """s by which a gyroscope sample is older than its stamp: the group delay of the part's low-pass.
-
-    The pose looks ahead by it. MPU-6500 at 184 Hz: 2.9 ms; its accelerometer 5.8 ms.
-    """
+    """s by which a gyroscope sample is older than its stamp (see SensorErrors). The pose looks ahead by it."""
     acc_delay_s: float = 0.006
     """s, the same for the accelerometer."""
     mag_delay_s: float = 0.008
-    """s, the same for the magnetometer. AK8963: a conversion takes 7 ms."""
+    """s, the same for the magnetometer."""
     gyro_range: float = 35.0
     """rad/s a component can reach: beyond is a spike, at it the part is saturated. 2000 degrees/s, the widest of phone
     parts, is 34.9."""
@@ -56,14 +49,8 @@ class AdaptiveParams:
     """False takes none, as Android's game rotation vector: north is where the phone faced at the start."""
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.gyro_range) and self.gyro_range > 0.0):
-            raise InvalidArgumentError(f"AdaptiveParams.gyro_range is {self.gyro_range}; give a finite number above 0")
-        for name in ("gyro_delay_s", "acc_delay_s", "mag_delay_s"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= _MAX_DELAY_S:
-                raise InvalidArgumentError(
-                    f"AdaptiveParams.{name} is {value}; give seconds from 0 to {_MAX_DELAY_S}, usually thousandths"
-                )
+        require_positive(self, "gyro_range")
+        require_delays(self)
 
 
 @dataclass

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from posed.fusion.filter import SensorNoise, require_positive
+from posed.fusion.filter import SensorErrors, require_positive
 from posed.fusion.saved import filled, plain
 
 
@@ -11,7 +11,7 @@ from posed.fusion.saved import filled, plain
 class LiteralParams:
     """Sampling variances, those of DcmParams: what differs from `dcm` is the equations and not the tuning."""
 
-    noise: SensorNoise = field(default_factory=SensorNoise)
+    noise: SensorErrors = field(default_factory=SensorErrors)
     """White noise of the parts."""
     rotation_density: float = 0.02
     """rad/s/sqrt(Hz), error of the measured rate in motion."""

@@ -6,7 +6,7 @@ from typing import Any
 from posed.events import STANDARD_GRAVITY
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.event_arrays import HeldEvents
-from posed.fusion.filter import SensorNoise, require_positive
+from posed.fusion.filter import SensorErrors, require_positive
 from posed.fusion.gate import GateParams, GateState
 from posed.fusion.rest import RestParams, RestState
 from posed.fusion.saved import filled, plain
@@ -24,7 +24,7 @@ class DcmParams:
     of the parts alone.
     """
 
-    noise: SensorNoise = field(default_factory=SensorNoise)
+    noise: SensorErrors = field(default_factory=SensorErrors)
     """White noise of the parts."""
     rotation_density: float = 0.02
     """rad/s/sqrt(Hz), error of the measured rate in motion. Larger follows gravity and north faster."""
