@@ -18,8 +18,9 @@ _ENOUGH_NS = 300_000_000
 def cpu_ns_per_event(make: Callable[[], OrientationFilter], batch: EventBatch) -> float:
     """Return the CPU time (ns) of a fresh filter fed a whole trial, divided by the trial's events.
 
-    The least of three runs, fewer if they are long. The divisor is the number of events for every filter, so that they
-    are compared over the same work.
+    The least of three runs, fewer if they are long. The divisor is the number of events for every filter. That compares
+    filters of other packages (see `work`) with ours only where all sensors have one rate, as in BROAD's trials at
+    native: elsewhere theirs step for more samples than there are events.
     """
     clock = BootClock()
     spent: list[int] = []
