@@ -13,8 +13,6 @@ cdef extern from "math.h":
 cdef long long _ACCELEROMETER
 cdef long long _MAGNETIC_FIELD
 cdef long long _GYROSCOPE
-cdef long long _GAP
-cdef long long _BAD_SAMPLE
 cdef long long _MAX_STEP_NS
 cdef long long _MAX_TIME_NS
 cdef double _MAX_STEP_S
@@ -61,5 +59,3 @@ cdef class DcmFilter:
     cdef void _correct_heading(self, long long t, double x, double y, double z) noexcept
     cdef double _heading_variance(self) noexcept
     cdef void _restart(self, long long t) noexcept
-    cdef void _flag_gap(self) noexcept
-    cdef void _flag_bad_sample(self) noexcept

@@ -3,8 +3,12 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+from posed.events import FilterStatus
 from posed.fusion.filter import SensorErrors, require_positive
 from posed.fusion.saved import filled, plain
+
+_GAP = int(FilterStatus.GAP)
+_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,16 @@ class LiteralState:
     events: int = 0
     bad_samples: int = 0
     gaps: int = 0
+
+    def flag_gap(self) -> None:
+        """Count a gap or a sample out of order, and have the next pose say so."""
+        self.gaps += 1
+        self.events |= _GAP
+
+    def flag_bad_sample(self) -> None:
+        """Count a sample refused, and have the next pose say so."""
+        self.bad_samples += 1
+        self.events |= _BAD_SAMPLE
 
     def to_dict(self) -> dict[str, Any]:
         """Return the state as a dict of numbers and booleans."""

@@ -5,6 +5,9 @@ from posed.fusion.gate cimport GateState
 from posed.fusion.event_arrays cimport HeldEvents
 from posed.fusion.rest cimport RestState
 
+cdef long long _GAP
+cdef long long _BAD_SAMPLE
+
 @cython.final
 cdef class DcmState:
     cdef public DirectionCosines matrix
@@ -33,3 +36,6 @@ cdef class DcmState:
     cdef public HeldEvents held
     cdef public RestState rest
     cdef public GateState gate
+
+    cpdef void flag_gap(self) noexcept
+    cpdef void flag_bad_sample(self) noexcept

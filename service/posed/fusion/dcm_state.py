@@ -3,13 +3,16 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from posed.events import STANDARD_GRAVITY
+from posed.events import STANDARD_GRAVITY, FilterStatus
 from posed.fusion.direction_cosines import DirectionCosines
 from posed.fusion.event_arrays import HeldEvents
 from posed.fusion.filter import SensorErrors, require_positive
 from posed.fusion.gate import GateParams, GateState
 from posed.fusion.rest import RestParams, RestState
 from posed.fusion.saved import filled, plain
+
+_GAP = int(FilterStatus.GAP)
+_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +88,16 @@ class DcmState:
     def fresh(cls, params: DcmParams) -> "DcmState":
         """Return the state before the first event."""
         return cls(rest=RestState(bias_variance=params.rest.bias_std**2))
+
+    def flag_gap(self) -> None:
+        """Count a gap or a sample out of order, and have the next pose say so."""
+        self.gaps += 1
+        self.events |= _GAP
+
+    def flag_bad_sample(self) -> None:
+        """Count a sample refused, and have the next pose say so."""
+        self.bad_samples += 1
+        self.events |= _BAD_SAMPLE
 
     def to_dict(self) -> dict[str, Any]:
         """Return the state as dicts, lists, numbers and booleans."""
