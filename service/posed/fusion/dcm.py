@@ -24,6 +24,7 @@ from posed.fusion.dcm_state import DcmParams, DcmState
 from posed.fusion.event_arrays import MAX_HELD, EventArrays
 from posed.fusion.gate import MagneticGate
 from posed.fusion.rest import RestBias
+from posed.fusion.saved import filled, plain
 
 __all__ = ["DcmFilter", "DcmParams"]
 
@@ -125,7 +126,7 @@ class DcmFilter:
 
     def save(self) -> dict[str, Any]:
         """Return the state as values that JSON can hold."""
-        return {"filter": self.name, "state": self.state.to_dict()}
+        return {"filter": self.name, "state": plain(self.state)}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `save` returned; raises InvalidArgumentError for anything else."""
@@ -133,7 +134,7 @@ class DcmFilter:
             raise InvalidArgumentError(
                 f"the saved state is of filter {saved.get('filter')!r}; restore it into that one, not {self.name!r}"
             )
-        self._use(DcmState.from_dict(saved.get("state")))
+        self._use(filled(DcmState, saved.get("state"), "state"))
 
     def _use(self, state: DcmState) -> None:
         self.state = state

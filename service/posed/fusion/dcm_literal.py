@@ -33,6 +33,7 @@ from posed.errors import InvalidArgumentError
 from posed.events import STANDARD_GRAVITY, FilterStatus, FlatEvent, Orientation, SensorType
 from posed.fusion.dcm_literal_state import LiteralParams, LiteralState
 from posed.fusion.direction_cosines import DirectionCosines
+from posed.fusion.saved import filled, plain
 
 __all__ = ["LiteralFilter", "LiteralParams"]
 
@@ -108,7 +109,7 @@ class LiteralFilter:
 
     def save(self) -> dict[str, Any]:
         """Return the state as values that JSON can hold."""
-        return {"filter": self.name, "state": self.state.to_dict()}
+        return {"filter": self.name, "state": plain(self.state)}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `save` returned; raises InvalidArgumentError for anything else."""
@@ -116,7 +117,7 @@ class LiteralFilter:
             raise InvalidArgumentError(
                 f"the saved state is of filter {saved.get('filter')!r}; restore it into that one, not {self.name!r}"
             )
-        self.state = LiteralState.from_dict(saved.get("state"))
+        self.state = filled(LiteralState, saved.get("state"), "state")
 
     def _take(self, sensor_type: int, t: int, x: float, y: float, z: float) -> None:
         if sensor_type not in (_ACCELEROMETER, _MAGNETIC_FIELD, _GYROSCOPE):

@@ -1,11 +1,9 @@
 """What the literal DCM filter is told (LiteralParams) and all that it remembers (LiteralState)."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from posed.events import FilterStatus
 from posed.fusion.filter import SensorErrors, require_positive
-from posed.fusion.saved import filled, plain
 
 _GAP = int(FilterStatus.GAP)
 _BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
@@ -81,13 +79,3 @@ class LiteralState:
         """Count a sample refused, and have the next pose say so."""
         self.bad_samples += 1
         self.events |= _BAD_SAMPLE
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the state as a dict of numbers and booleans."""
-        saved: dict[str, Any] = plain(self)
-        return saved
-
-    @classmethod
-    def from_dict(cls, saved: Any) -> "LiteralState":
-        """Return the state that `to_dict` gave; raises InvalidArgumentError for anything else."""
-        return filled(cls, saved, "state")

@@ -1,7 +1,6 @@
 """What the DCM filter is told (DcmParams) and all that it remembers (DcmState)."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from posed.events import STANDARD_GRAVITY, FilterStatus
 from posed.fusion.direction_cosines import DirectionCosines
@@ -9,7 +8,6 @@ from posed.fusion.event_arrays import HeldEvents
 from posed.fusion.filter import SensorErrors, require_positive
 from posed.fusion.gate import GateParams, GateState
 from posed.fusion.rest import RestParams, RestState
-from posed.fusion.saved import filled, plain
 
 _GAP = int(FilterStatus.GAP)
 _BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
@@ -98,13 +96,3 @@ class DcmState:
         """Count a sample refused, and have the next pose say so."""
         self.bad_samples += 1
         self.events |= _BAD_SAMPLE
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the state as dicts, lists, numbers and booleans."""
-        saved: dict[str, Any] = plain(self)
-        return saved
-
-    @classmethod
-    def from_dict(cls, saved: Any) -> "DcmState":
-        """Return the state that `to_dict` gave; raises InvalidArgumentError for anything else."""
-        return filled(cls, saved, "state")
