@@ -22,9 +22,9 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 # follow this list through the record that the build leaves.
 PACKAGE = "posed.fusion"
 MODULES = [
-    *("direction_cosines", "held", "rest", "gate", "dcm_state", "dcm", "three_state"),
+    *("direction_cosines", "event_arrays", "rest", "gate", "dcm_state", "dcm", "three_state"),
     *("adaptive_interval", "adaptive_tilt", "adaptive_bias", "adaptive_field", "adaptive_iron", "adaptive_heading"),
-    *("adaptive_state", "adaptive"),
+    *("adaptive_repeats", "adaptive_state", "adaptive_corrections", "adaptive"),
 ]
 
 _FOLDER = Path("service", *PACKAGE.split("."))

@@ -3,6 +3,7 @@
     python benchmarks/ablation.py               # needs POSED_DATA and the extra `evaluate`; minutes when compiled
     python benchmarks/ablation.py parameters    # at GAME and NORMAL only: native says what GAME says
     python benchmarks/ablation.py --half A      # every other trial of each data set by name; B: the others
+    python benchmarks/ablation.py held-out      # parameters fixed on one half, tested on the other
 
 The filter runs over the trials of BROAD and of the smartphone attitude data set, with one thing changed at a time.
 Printed is the mean total error in degrees by BROAD's definition at each mode, behind the stroke that of the
@@ -83,6 +84,57 @@ def parameters() -> dict[str, dict[str, object]]:
     return variants
 
 
+FITTED = (
+    *("tilt.time_s", "tilt.interval_noise", "interval.loss", "heading.time_s", "heading.field_noise", "heading.bias_s"),
+    *("bias.std", "bias.motion_std", "earth.norm_tolerance", "earth.dip_tolerance"),
+    *("gyro_delay_s", "acc_delay_s", "mag_delay_s"),
+)
+"""What the recordings had a say in; the rest is physics, data sheets and VQF's."""
+FACTORS = (0.5, 0.7, 1.0, 1.4, 2.0)
+
+
+def held_out(data: Path) -> None:
+    """Print what parameters fixed on one half of the trials do on the other half, beside the defaults.
+
+    On each half every parameter in turn takes the best of five values from half to double its default, the others
+    being as they are by then; best is the least mean total error over both data sets at GAME and NORMAL.
+    """
+    halves: dict[str, list[tuple[Trial, ModeName, list[FlatEvent]]]] = {"A": [], "B": []}
+    for which, cases in halves.items():
+        for folder in ("broad", "smartphone-attitude"):
+            for path in half(find_trials([data / folder]), which):
+                trial = load_trial(path)
+                cases += [(trial, mode, mode_events(trial, mode)) for mode in ("GAME", "NORMAL")]
+
+    def means(params: AdaptiveParams, which: str) -> dict[tuple[str, ModeName], float]:
+        found: dict[tuple[str, ModeName], list[float]] = {}
+        for trial, mode, events in halves[which]:
+            found.setdefault((trial.dataset, mode), []).append(errors(trial, events, params).total)
+        return {column: float(np.mean(each)) for column, each in found.items()}
+
+    def cost(params: AdaptiveParams, which: str) -> float:
+        return float(np.mean(list(means(params, which).values())))
+
+    for fitted, tested in (("A", "B"), ("B", "A")):
+        default = chosen = AdaptiveParams()
+        moved: dict[str, float] = {}
+        for name, value in numbers(default):
+            if name in FITTED:
+                tried = [changed(chosen, {name: factor * value}) for factor in FACTORS]
+                costs = [cost(params, fitted) for params in tried]
+                best = int(np.argmin(costs))
+                chosen = tried[best]
+                moved[name] = FACTORS[best]
+                print(fitted, name, FACTORS[best], f"{costs[best]:.3f}", file=sys.stderr, flush=True)
+        print(f"fixed on {fitted}: " + ", ".join(f"{name} * {f}" for name, f in moved.items() if f != 1.0))
+        for which in (fitted, tested):
+            own, shipped = means(chosen, which), means(default, which)
+            cells = (
+                f"{dataset} {mode} {own[dataset, mode]:.2f} ({shipped[dataset, mode]:.2f})" for dataset, mode in own
+            )
+            print(f"  on {which}, in brackets the defaults: " + ", ".join(cells))
+
+
 def errors(trial: Trial, events: Sequence[FlatEvent], params: AdaptiveParams) -> Errors:
     """Return the errors of the filter's orientation right after each gyroscope sample."""
     adaptive = AdaptiveFilter(params)
@@ -109,11 +161,14 @@ def main() -> int:
     if data is None:
         sys.exit("set POSED_DATA to the folder of recordings")
     parser = argparse.ArgumentParser(description="What each part of dcm-adaptive pays.")
-    parser.add_argument("what", nargs="?", choices=["parameters"], help="half and double of each, not what is left out")
+    parser.add_argument("what", nargs="?", choices=["parameters", "held-out"], help="not what is left out, but this")
     parser.add_argument(
         "--half", choices=["A", "B"], help="every other trial of each data set by name, B from the second"
     )
     options = parser.parse_args()
+    if options.what == "held-out":
+        held_out(Path(data))
+        return 0
     variants = parameters() if options.what else ABLATIONS
     modes: tuple[ModeName, ...] = ("GAME", "NORMAL") if options.what else MODES
     made = {name: changed(AdaptiveParams(), changes) for name, changes in variants.items()}

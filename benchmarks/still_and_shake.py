@@ -17,7 +17,7 @@ from simulation import axes, raw_axes, simulate
 from posed.events import Float64Array
 from posed.fusion.dcm import DcmFilter, DcmParams
 from posed.hal.profile import load_profile
-from posed.sensors import device_noise
+from posed.sensors import device_errors
 
 ANGLES = ("heading", "pitch", "roll")
 WARM_UP_S = 30.0
@@ -63,7 +63,7 @@ def _angle_deg(up: Float64Array, true: Float64Array) -> Float64Array:
 
 def main() -> int:
     """Print the tables; exit code 1 if a target is missed."""
-    own = DcmParams(noise=device_noise(load_profile("patonis2018")))
+    own = DcmParams(noise=device_errors(load_profile("patonis2018")))
     worst = {"heading": 0.3, "pitch": 0.02, "roll": 0.02}
     paper = {"heading": "3 -> 0.2 (15x)", "pitch": "0.2 -> 0.007 (28x)", "roll": "0.2 -> 0.007 (28x)"}
     still = run("still", 300, own)

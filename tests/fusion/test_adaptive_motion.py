@@ -24,7 +24,7 @@ from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus, Float64Array, Orientation, SensorType
 from posed.fusion import make_filter
 from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
-from posed.fusion.adaptive_interval import IntervalParams
+from posed.fusion.adaptive_interval import GyroInterval, IntervalParams, IntervalState
 
 ACC, GYRO, MAG = SensorType.ACCELEROMETER, SensorType.GYROSCOPE, SensorType.MAGNETIC_FIELD
 UI = (15.0, 15.0, 15.0)
@@ -276,3 +276,18 @@ def test_parameters_without_meaning_are_refused(part: str) -> None:
         if isinstance(getattr(params, name), float):
             with pytest.raises(InvalidArgumentError, match=name):
                 replace(params, **{name: 0.0})
+
+
+def test_before_an_interval_the_rate_is_what_the_interval_begins_with() -> None:
+    """A measurement that came ten intervals late: a slope of 100 rad/s2 carried back would turn it by a radian."""
+    interval = GyroInterval(IntervalParams(), IntervalState())
+    interval.begin(1.0, 0.0, 0.0)
+    interval.push(2.0, 0.0, 0.0, 0.01)
+    interval.push(3.0, 0.0, 0.0, 0.01)
+    interval.close(4.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0)
+    interval.turn(1.0)
+    assert (interval.x, interval.y, interval.z) == pytest.approx((0.03, 0.0, 0.0))
+    interval.turn(0.5)
+    assert interval.x == pytest.approx(0.005 * 2.75)
+    interval.turn(-10.0)
+    assert (interval.x, interval.y, interval.z) == pytest.approx((-0.1 * 2.5, 0.0, 0.0))

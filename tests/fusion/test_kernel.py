@@ -11,11 +11,13 @@ import pytest
 
 FUSION = Path(__file__).parents[2] / "service" / "posed" / "fusion"
 
-# Half an hour's worth of defects in a few minutes: turns of all sizes, gaps, disorder, NaN, magnets, lost gyroscope.
+# Half an hour's worth of defects in a few minutes, by lists and arrays in turn: turns of all sizes,
+# gaps, disorder, NaN, magnets, lost gyroscope.
 FUSE = """
 import hashlib, json, sys
 import numpy as np
 from posed.fusion import FILTERS, PACKAGED, make_filter
+from posed.fusion.event_arrays import EventArrays
 from posed.fusion.kernel import kernel
 
 rng = np.random.default_rng(7)
@@ -36,11 +38,12 @@ for name in sorted(FILTERS.keys() - set(PACKAGED)):
         values[(kinds == 2) & (np.arange(count) // 1000 == 4)] *= 1.5
         values[rng.random(count) < 0.005] = np.nan
         kinds[(kinds == 4) & (np.arange(count) // 500 == 7)] = 1
-        rows = zip(kinds.tolist(), np.cumsum(steps).tolist(), values.tolist(), strict=True)
-        events = [(kind, t, x, y, z) for kind, t, (x, y, z) in rows]
+        arrays = EventArrays(kinds, np.cumsum(steps), values)
+        events = list(arrays)
         orientation_filter = make_filter(name)
         for start in range(0, count, 40):
-            orientation_filter.update_batch(events[start : start + 40])
+            batch = slice(start, start + 40)
+            orientation_filter.update_batch((events, arrays)[start // 40 % 2][batch])
             digest.update(repr(orientation_filter.orientation()).encode())
             digest.update(json.dumps(orientation_filter.save()).encode())
     print(name, digest.hexdigest())

@@ -236,6 +236,13 @@ soft_iron = [[1.1, 0, 0], [0, 0.9, 0.05], [0, 0.05, 1]]
         ("rates_hz = [15, 50]", "rates_hz = [0, 15]", "accelerometer.rates_hz = [0, 15]", "above 0"),
         ("rates_hz = [15, 50]", "rates_hz = [nan]", "accelerometer.rates_hz = [nan]", "above 0"),
         ("rates_hz = [15, 50]", "rates_hz = [2000]", "accelerometer.rates_hz = [2000.0]", "up to 1000 Hz"),
+        (
+            "noise_density = 0.1",
+            "noise_density = 0.1\ndelay_s = -0.003",
+            "magnetic_field.delay_s = -0.003",
+            "0 or more",
+        ),
+        ("noise_density = 0.1", "noise_density = 0.1\ndelay_s = 3", "magnetic_field.delay_s = 3", "seconds up to 0.1"),
         ("noise_density = 0.1", "noise_density = nan", "magnetic_field.noise_density = nan", "0 or more"),
         ("noise_density = 0.1", "noise_density = 0.1\nversion = 0", "magnetic_field.version = 0", "an integer, 1"),
         ("noise_density = 0.1", "noise_density = 0.1\nfifo_reserved = 9", "fifo_reserved = 9", "at most fifo_max, 0"),

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from posed.clock import TimeMap, VirtualClock
 from posed.errors import InvalidArgumentError
-from posed.events import EventColumn, Float64Array, RateMode
+from posed.events import EventColumn, Float64Array, RateMode, SensorType
+from posed.fusion import SensorErrors, make_filter
 from posed.hal import open_source, rotation
 from posed.hal.calibration import Calibration
 from posed.hal.motion import Target, make_script
@@ -35,7 +36,13 @@ def changed(profile: DeviceProfile, **changes: object) -> DeviceProfile:
 def ideal(profile: DeviceProfile = TABLET) -> DeviceProfile:
     """Return the profile of a phone without errors."""
     return changed(
-        profile, noise_density=0.0, bias_walk=0.0, timestamp_jitter_s=0.0, resolution=1e-13, residual=ResidualErrors()
+        profile,
+        noise_density=0.0,
+        bias_walk=0.0,
+        timestamp_jitter_s=0.0,
+        delay_s=0.0,
+        resolution=1e-13,
+        residual=ResidualErrors(),
     )
 
 
@@ -495,3 +502,40 @@ class TestOpenSource:
             open_source("sim", TABLET, VirtualClock(), seed=-1)
         with pytest.raises(InvalidArgumentError, match="motion script 'dance' is unknown"):
             open_source("sim:dance", TABLET, VirtualClock())
+
+
+def test_a_delayed_part_stamps_what_was_felt_before() -> None:
+    """By a whole period: the same readings, one stamp later, after the standstill that the motion begins with."""
+    prompt, late = (phone(changed(ideal(), delay_s=delay_s), handles=(ACCELEROMETER,))[0] for delay_s in (0.0, 0.01))
+    felt, stamped = drained(prompt, 20, ACCELEROMETER), drained(late, 20, ACCELEROMETER)
+    np.testing.assert_array_equal(stamped.timestamp_ns, felt.timestamp_ns)
+    np.testing.assert_allclose(stamped.values[1:], felt.values[:-1], atol=1e-9)
+    assert np.abs(stamped.values - felt.values).max() > 0.01
+
+
+def test_the_default_filter_makes_the_delays_good() -> None:
+    def error_deg(delay_s: float, told_s: float) -> float:
+        source, _ = phone(changed(ideal(), delay_s=delay_s))
+        told = SensorErrors(gyro_delay_s=told_s, acc_delay_s=told_s, mag_delay_s=told_s)
+        adaptive = make_filter("dcm-adaptive", told)
+        adaptive.update_batch(source.drain(START + 60 * SECOND).flat({handle: SensorType(handle) for handle in THREE}))
+        errors = []
+        for hundredth in range(6001, 7001):
+            batch = source.drain(START + hundredth * SECOND // 100)
+            adaptive.update_batch(batch.flat({handle: SensorType(handle) for handle in THREE}))
+            answer = adaptive.orientation()
+            assert answer is not None
+            truth = source.truth(answer.timestamp_ns)
+            assert truth is not None
+            magnetic = rotation.multiply(
+                np.array([[0.0, 0.0, math.sin(truth.declination / 2), math.cos(truth.declination / 2)]]),
+                np.array([truth.quaternion]),
+            )
+            errors.append(2.0 * math.acos(min(1.0, abs(float(magnetic[0] @ answer.quaternion)))))
+        return math.degrees(float(np.sqrt(np.mean(np.square(errors)))))
+
+    # What is left without any delay is the linear acceleration's.
+    prompt = error_deg(0.0, 0.0)
+    assert error_deg(0.006, 0.006) == pytest.approx(prompt, rel=0.05)
+    assert error_deg(0.006, 0.0) > 1.3 * prompt
+    assert error_deg(0.0, 0.006) > 1.3 * prompt

@@ -4,7 +4,7 @@ from posed.fusion import kernel
 
 kernel.prepare()
 
-from posed.fusion.filter import OrientationFilter, SensorNoise  # noqa: E402
+from posed.fusion.filter import OrientationFilter, SensorErrors  # noqa: E402
 from posed.fusion.table import DEFAULT_FILTER, FILTERS, PACKAGED, make_filter  # noqa: E402
 
-__all__ = ["DEFAULT_FILTER", "FILTERS", "PACKAGED", "OrientationFilter", "SensorNoise", "make_filter"]
+__all__ = ["DEFAULT_FILTER", "FILTERS", "PACKAGED", "OrientationFilter", "SensorErrors", "make_filter"]

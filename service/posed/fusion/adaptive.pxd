@@ -1,15 +1,12 @@
 cimport cython
 
-from posed.fusion.adaptive_bias cimport GyroBias
-from posed.fusion.adaptive_field cimport FieldGate
-from posed.fusion.adaptive_heading cimport Heading, HeadingState
-from posed.fusion.adaptive_interval cimport GyroInterval, IntervalState
-from posed.fusion.adaptive_iron cimport HardIron, IronState
+from posed.fusion.adaptive_corrections cimport Corrections
+from posed.fusion.adaptive_heading cimport Heading
+from posed.fusion.adaptive_interval cimport GyroInterval
 from posed.fusion.adaptive_state cimport AdaptiveState
-from posed.fusion.adaptive_tilt cimport Tilt, TiltState
 from posed.fusion.direction_cosines cimport DirectionCosines
-from posed.fusion.held cimport HeldEvents
-from posed.fusion.rest cimport RestBias, RestState
+from posed.fusion.event_arrays cimport EventArrays, HeldEvents
+from posed.fusion.rest cimport RestBias
 from posed.fusion.three_state cimport ThreeState
 
 cdef extern from "math.h":
@@ -18,20 +15,12 @@ cdef extern from "math.h":
 cdef long long _ACCELEROMETER
 cdef long long _MAGNETIC_FIELD
 cdef long long _GYROSCOPE
-cdef long long _GAP
-cdef long long _BAD_SAMPLE
 cdef long long _MAX_STEP_NS
 cdef long long _MAX_LATE_NS
 cdef long long _MAX_TIME_NS
 cdef double _MAX_STEP_S
-cdef double _FIRST_STEP_S
-cdef double _STUCK_S
-cdef long long _STUCK_SAMPLES
 cdef Py_ssize_t _MAX_HELD
-cdef double _MIN_ACCELERATION2
-cdef double _UNSTEADY
 cdef double _MAX_MEASUREMENT2
-cdef double _MIN_HORIZONTAL2
 
 @cython.final
 cdef class AdaptiveFilter:
@@ -46,17 +35,15 @@ cdef class AdaptiveFilter:
     cdef double _turning2
     cdef long long _acc_late_ns
     cdef long long _mag_late_ns
-    cdef double _tilt_time_s
-    cdef double _two_damping
+    cdef Corrections _corrections
     cdef GyroInterval _interval
-    cdef Tilt _tilt
     cdef RestBias _rest
-    cdef GyroBias _bias
-    cdef FieldGate _earth
-    cdef HardIron _iron
     cdef Heading _heading
 
-    @cython.locals(sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double)
+    @cython.locals(
+        sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double,
+        rows=EventArrays, k=Py_ssize_t,
+    )
     cpdef update_batch(self, events)
 
     @cython.locals(s=AdaptiveState, held=HeldEvents, newest=cython.longlong, norm2=double, largest=double)
@@ -75,17 +62,4 @@ cdef class AdaptiveFilter:
     cdef void _lose_gyro(self) noexcept
     @cython.locals(step=cython.longlong)
     cdef void _measure_alone(self, long long sensor_type, long long t, double x, double y, double z) noexcept
-    cdef void _measure(self, long long sensor_type, long long t, double x, double y, double z, double u) noexcept
-    @cython.locals(
-        s=AdaptiveState, c=DirectionCosines, tilt=TiltState, rest=RestState, interval=GyroInterval, dt=double, norm2=double, change=double,
-        east_x=double, east_y=double, east_z=double, levelled=bint,
-    )
-    cdef void _measure_gravity(self, long long t, double x, double y, double z, double u) noexcept
-    @cython.locals(
-        s=AdaptiveState, c=DirectionCosines, interval=GyroInterval, interval_state=IntervalState, iron=IronState,
-        b=ThreeState, dt=double, weight=double,
-    )
-    cdef void _measure_north(self, long long t, double x, double y, double z, double u) noexcept
     cdef void _restart(self, long long t) noexcept
-    cdef void _flag_gap(self) noexcept
-    cdef void _flag_bad_sample(self) noexcept

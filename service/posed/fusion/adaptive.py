@@ -19,16 +19,10 @@ from typing import Any
 
 from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
-from posed.fusion.adaptive_bias import GyroBias
-from posed.fusion.adaptive_field import FieldGate
-from posed.fusion.adaptive_heading import Heading
-from posed.fusion.adaptive_interval import GyroInterval
-from posed.fusion.adaptive_iron import HardIron
+from posed.fusion.adaptive_corrections import Corrections
 from posed.fusion.adaptive_state import AdaptiveParams, AdaptiveState
-from posed.fusion.adaptive_tilt import Tilt
 from posed.fusion.direction_cosines import DirectionCosines
-from posed.fusion.held import MAX_HELD
-from posed.fusion.rest import RestBias
+from posed.fusion.event_arrays import MAX_HELD, EventArrays
 from posed.fusion.saved import filled, plain
 
 __all__ = ["AdaptiveFilter", "AdaptiveParams"]
@@ -50,29 +44,17 @@ _MAX_HELD = MAX_HELD
 _MAX_STEP_NS = 500_000_000
 """A longer step of time is a gap, and a sensor without a sample for so long is lost."""
 _MAX_STEP_S = 0.5
-_STUCK_S = 0.5
-_STUCK_SAMPLES = 8
-"""Values that stay the same to the last bit for so long in motion, and so often, are those of a sensor that hangs. In
-motion only: noise below the last bit repeats itself on a table, and at NORMAL half a second is two samples."""
-_UNSTEADY = 0.1
-"""Of the acceleration's squared norm, (m/s2)2: noise of 0.005 m/s2. A stream without any, as one writes it by hand, may
-well hold the same rate for seconds."""
 _MAX_LATE_NS = 100_000_000
 """Before the newest interval the rate is taken to run on as it begins, which holds no longer than this."""
 _FREE_NS = 1_000_000_000
 """Without a magnetometer sample for so long the heading is free, and at the start no longer waited for."""
 _MAX_TIME_NS = 2**62
 """A time further from zero (146 years) is none; the differences of all others fit 64 bits."""
-_FIRST_STEP_S = 0.02
-"""What the first sample of a sensor stands for: GAME's period, for want of a predecessor."""
 _UNKNOWN_HEADING = pi / sqrt(3.0)
 """rad, one sigma of a heading of which nothing is known (uniform over the circle)."""
 
-# Squared norms beyond which a sample is no measurement; comparisons are written so that NaN fails them.
-_MIN_ACCELERATION2 = 1.0**2
 _MAX_MEASUREMENT2 = 10_000.0**2
-_MIN_HORIZONTAL2 = 0.01**2
-"""Of the field's squared norm: within 0.6 degrees of the vertical it points nowhere."""
+"""A squared norm beyond which a sample is no measurement; comparisons are written so that NaN fails them."""
 
 
 class AdaptiveFilter:
@@ -94,8 +76,6 @@ class AdaptiveFilter:
         # The matrix lags its stamp as the gyroscope does: relative to it, measurements are this much late.
         self._acc_late_ns = round((p.acc_delay_s - p.gyro_delay_s) * 1e9)
         self._mag_late_ns = round((p.mag_delay_s - p.gyro_delay_s) * 1e9)
-        self._tilt_time_s = p.tilt.time_s
-        self._two_damping = 2.0 * p.tilt.damping
         self._use(state if state is not None else AdaptiveState.fresh(p))
 
     def update(self, sensor_type: SensorType, timestamp_ns: int, x: float, y: float, z: float) -> None:
@@ -107,7 +87,12 @@ class AdaptiveFilter:
         self._take(int(sensor_type), int(timestamp_ns), float(x), float(y), float(z))
 
     def update_batch(self, events: Iterable[FlatEvent]) -> None:
-        """Take events in the order given, each as by `update`."""
+        """Take events in the order given, each as by `update`; EventArrays are taken fastest."""
+        if isinstance(events, EventArrays):
+            rows = events
+            for k in range(rows.count):
+                self._take(rows.sensor_type[k], rows.timestamp_ns[k], rows.x[k], rows.y[k], rows.z[k])
+            return
         for sensor_type, timestamp_ns, x, y, z in events:
             self._take(sensor_type, timestamp_ns, x, y, z)
 
@@ -180,15 +165,11 @@ class AdaptiveFilter:
         self._use(filled(AdaptiveState, saved.get("state"), "state"))
 
     def _use(self, state: AdaptiveState) -> None:
-        p = self.params
         self.state = state
-        self._interval = GyroInterval(p.interval, state.interval)
-        self._tilt = Tilt(p.tilt, state.tilt)
-        self._rest = RestBias(p.rest, state.rest)
-        self._bias = GyroBias(p.bias, state.bias)
-        self._earth = FieldGate(p.earth, state.earth)
-        self._iron = HardIron(p.iron, state.iron)
-        self._heading = Heading(p.heading, state.heading)
+        self._corrections = Corrections(self.params, state)
+        self._interval = self._corrections.interval
+        self._rest = self._corrections.rest
+        self._heading = self._corrections.heading
 
     def _take(self, sensor_type: int, t: int, x: float, y: float, z: float) -> None:
         s = self.state
@@ -199,11 +180,11 @@ class AdaptiveFilter:
             largest = max(abs(x), abs(y), abs(z))
             # The largest of three is not NaN for certain, their squared norm is.
             if not (norm2 < _MAX_MEASUREMENT2 and largest <= self._max_rate and -_MAX_TIME_NS < t < _MAX_TIME_NS):
-                self._flag_bad_sample()
+                s.flag_bad_sample()
                 return
             if largest >= self._saturated_rate:
                 # The turn was at least this one: better than none.
-                self._flag_bad_sample()
+                s.flag_bad_sample()
             self._see(t)
             self._take_rate(t, x, y, z)
             return
@@ -213,13 +194,13 @@ class AdaptiveFilter:
         elif sensor_type != _ACCELEROMETER:
             return
         if not (norm2 < _MAX_MEASUREMENT2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
-            self._flag_bad_sample()
+            s.flag_bad_sample()
             return
         self._see(t)
         if t - s.newest_ns > _MAX_STEP_NS and not s.ahead:
             # A wrong stamp, or the first sample after a gap: the next one tells.
             s.ahead = True
-            self._flag_bad_sample()
+            s.flag_bad_sample()
             return
         s.ahead = False
         if t > s.newest_ns:
@@ -247,27 +228,20 @@ class AdaptiveFilter:
         dt = 0.0
         if s.has_gyro and t > s.gyro_ns:
             dt = min((t - s.gyro_ns) * 1e-9, _MAX_STEP_S)
-        if x != s.gyro_x or y != s.gyro_y or z != s.gyro_z or not s.has_gyro:
-            s.gyro_same = 0
-            s.gyro_same_s = 0.0
-            s.gyro_x = x
-            s.gyro_y = y
-            s.gyro_z = z
-        else:
-            s.gyro_same += 1
-            if s.gyro_same_s > _STUCK_S and s.gyro_same >= _STUCK_SAMPLES:
-                self._flag_bad_sample()
+        if s.gyro_repeats.take(x, y, z, not s.has_gyro):
+            if s.gyro_repeats.stuck():
+                s.flag_bad_sample()
                 return
             # Exactly zero is what a simulated phone reads that is moved without being turned.
             if s.unsteady and (turning or (s.rest.shaken and norm2 > 0.0)):
-                s.gyro_same_s += dt
+                s.gyro_repeats.moved_s += dt
         if turning:
             c = s.matrix
             about_up = x * c.up_x + y * c.up_y + z * c.up_z
             if norm2 - about_up * about_up > self._turning2:
                 # A turn about the vertical leaves the accelerometer as it is.
-                s.acc_same_s += dt
-            s.mag_same_s += dt
+                s.acc_repeats.moved_s += dt
+            s.mag_repeats.moved_s += dt
         s.ahead = False
         if t > s.newest_ns:
             s.newest_ns = t
@@ -277,7 +251,7 @@ class AdaptiveFilter:
             self._restart(t)
         elif s.has_gyro and not s.gyro_lost:
             if step <= 0:
-                self._flag_gap()
+                s.flag_gap()
                 return
             dt = step * 1e-9
             self._close(x, y, z, dt)
@@ -289,8 +263,8 @@ class AdaptiveFilter:
         elif s.gyro_lost:
             # Measurements that went on alone may have passed the first sample of a gyroscope that came back.
             s.gyro_lost = False
-            self._tilt.resume()
-            self._bias.start_rows(s.matrix)
+            self._corrections.tilt.resume()
+            self._corrections.bias.start_rows(s.matrix)
         s.has_gyro = True
         self._interval.begin(x, y, z)
         s.start_ns = s.gyro_ns = s.time_ns = t
@@ -313,12 +287,12 @@ class AdaptiveFilter:
                 held.add(held.sensor_type[k], time_ns, held.x[k], held.y[k], held.z[k])
                 continue
             if s.start_ns - at_ns > _MAX_LATE_NS:
-                self._flag_gap()
+                s.flag_gap()
                 continue
             u = 1.0
             if length > 0.0:
                 u = (at_ns - s.start_ns) * 1e-9 / length
-            self._measure(held.sensor_type[k], time_ns, held.x[k], held.y[k], held.z[k], u)
+            self._corrections.measure(held.sensor_type[k], time_ns, held.x[k], held.y[k], held.z[k], u)
         if length > 0.0:
             c = s.matrix
             interval.turn(1.0)
@@ -350,162 +324,7 @@ class AdaptiveFilter:
         elif step > 0:
             self._heading.wander_lost(step * 1e-9)
             s.time_ns = t
-        self._measure(sensor_type, t, x, y, z, 0.0)
-
-    def _measure(self, sensor_type: int, t: int, x: float, y: float, z: float, u: float) -> None:
-        """Apply a measurement at the share `u` of the newest gyroscope interval."""
-        if sensor_type == _ACCELEROMETER:
-            self._measure_gravity(t, x, y, z, u)
-        else:
-            self._measure_north(t, x, y, z, u)
-
-    def _measure_gravity(self, t: int, x: float, y: float, z: float, u: float) -> None:
-        s = self.state
-        dt = _FIRST_STEP_S
-        if s.has_acc:
-            if t <= s.acc_ns:
-                self._flag_gap()
-                return
-            dt = min((t - s.acc_ns) * 1e-9, _MAX_STEP_S)
-        norm2 = x * x + y * y + z * z
-        change = norm2 - (s.acc_x * s.acc_x + s.acc_y * s.acc_y + s.acc_z * s.acc_z)
-        s.unsteady = s.has_acc and (change > _UNSTEADY or change < -_UNSTEADY)
-        if x != s.acc_x or y != s.acc_y or z != s.acc_z or not s.has_acc:
-            s.acc_same = 0
-            s.acc_same_s = 0.0
-            s.acc_x = x
-            s.acc_y = y
-            s.acc_z = z
-        else:
-            s.acc_same += 1
-        s.has_acc = True
-        s.acc_ns = t
-        s.free_fall = norm2 < _MIN_ACCELERATION2
-        if s.free_fall:
-            s.acc_used_ns = t
-            self._rest.moved()
-            return
-        self._rest.take_acceleration(x, y, z, dt)
-        rest = s.rest
-        if s.acc_same_s > _STUCK_S and s.acc_same >= _STUCK_SAMPLES:
-            self._flag_bad_sample()
-            return
-        s.acc_used_ns = t
-        c = s.matrix
-        tilt = s.tilt
-        if not s.gyro_lost:
-            interval = self._interval
-            interval.carry(x, y, z, u)
-            x = interval.x
-            y = interval.y
-            z = interval.z
-        if not tilt.known:
-            self._tilt.start(c, x, y, z, dt)
-            self._bias.start_rows(c)
-            return
-        east_x = c.north_y * c.up_z - c.north_z * c.up_y
-        east_y = c.north_z * c.up_x - c.north_x * c.up_z
-        east_z = c.north_x * c.up_y - c.north_y * c.up_x
-        levelled = self._tilt.level(
-            c,
-            east_x * x + east_y * y + east_z * z,
-            c.north_x * x + c.north_y * y + c.north_z * z,
-            c.up_x * x + c.up_y * y + c.up_z * z,
-            dt,
-            s.gyro_lost,
-            s.interval.error_rate,
-        )
-        if not levelled:
-            self._tilt.start(c, x, y, z, dt)
-            self._bias.start_rows(c)
-            s.heading.known = False
-            return
-        if s.gyro_lost or not self._bias.due(tilt.turn_x, tilt.turn_y, dt):
-            return
-        self._bias.follow(c, tilt.frequency, self._two_damping)
-        if rest.at_rest:
-            self._bias.observe_rest(rest.rate_x, rest.rate_y, rest.rate_z)
-        elif tilt.age_s > self._tilt_time_s:
-            self._bias.observe_motion()
-        else:
-            self._bias.skip()
-
-    def _measure_north(self, t: int, x: float, y: float, z: float, u: float) -> None:
-        s = self.state
-        dt = _FIRST_STEP_S
-        if s.has_mag:
-            if t <= s.mag_ns:
-                self._flag_gap()
-                return
-            dt = min((t - s.mag_ns) * 1e-9, _MAX_STEP_S)
-        if x != s.mag_x or y != s.mag_y or z != s.mag_z or not s.has_mag:
-            s.mag_same = 0
-            s.mag_same_s = 0.0
-            s.mag_x = x
-            s.mag_y = y
-            s.mag_z = z
-        else:
-            s.mag_same += 1
-            if s.gyro_lost and s.rest.shaken:
-                s.mag_same_s += dt
-        s.has_mag = True
-        s.mag_ns = t
-        if s.mag_same_s > _STUCK_S and s.mag_same >= _STUCK_SAMPLES:
-            self._flag_bad_sample()
-            return
-        s.mag_used_ns = t
-        if not s.tilt.known:
-            return
-        c = s.matrix
-        interval = self._interval
-        if self._iron.due(dt):
-            # Hard iron lies in the device's axes at the time of the reading.
-            interval.bring(c.up_x, c.up_y, c.up_z, 0.0 if s.gyro_lost else u)
-            self._iron.learn(x, y, z, interval.x, interval.y, interval.z)
-        iron = s.iron
-        if iron.use > 0.0:
-            b = iron.estimate
-            x -= iron.use * b.x
-            y -= iron.use * b.y
-            z -= iron.use * b.z
-        if not s.gyro_lost:
-            interval.carry(x, y, z, u)
-            x = interval.x
-            y = interval.y
-            z = interval.z
-        vertical = c.up_x * x + c.up_y * y + c.up_z * z
-        north = c.north_x * x + c.north_y * y + c.north_z * z
-        norm2 = x * x + y * y + z * z
-        horizontal2 = norm2 - vertical * vertical
-        if not horizontal2 > _MIN_HORIZONTAL2 * norm2:
-            self._flag_bad_sample()
-            return
-        horizontal = sqrt(horizontal2)
-        east = (
-            (c.north_y * c.up_z - c.north_z * c.up_y) * x
-            + (c.north_z * c.up_x - c.north_x * c.up_z) * y
-            + (c.north_x * c.up_y - c.north_y * c.up_x) * z
-        )
-        earth = self._earth
-        if not s.earth.known:
-            earth.start(horizontal, vertical)
-        elif s.earth_gap:
-            earth.resume(horizontal, vertical)
-        s.earth_gap = False
-        interval_state = s.interval
-        rate2 = (
-            interval_state.rate_x * interval_state.rate_x
-            + interval_state.rate_y * interval_state.rate_y
-            + interval_state.rate_z * interval_state.rate_z
-        )
-        weight = earth.weight(horizontal, vertical, dt, rate2)
-        if not weight > 0.0:
-            return
-        if not s.heading.known:
-            s.started = True
-            self._heading.start(east / horizontal, north / horizontal, dt)
-        else:
-            self._heading.follow(east / horizontal, north / horizontal, dt, weight)
+        self._corrections.measure(sensor_type, t, x, y, z, 0.0)
 
     def _restart(self, t: int) -> None:
         """Go on at time t after a gap: gravity and north are to be found anew; bias, iron and the earth's field stay.
@@ -513,7 +332,7 @@ class AdaptiveFilter:
         What is held was measured before the gap or in it, at an attitude nobody knows.
         """
         s = self.state
-        self._flag_gap()
+        s.flag_gap()
         s.held.count = 0
         s.time_ns = s.start_ns = s.first_ns = s.newest_ns = t
         s.ahead = False
@@ -525,11 +344,3 @@ class AdaptiveFilter:
         s.has_gyro = False
         s.gyro_lost = not self._use_gyroscope
         self._rest.moved()
-
-    def _flag_gap(self) -> None:
-        self.state.gaps += 1
-        self.state.events |= _GAP
-
-    def _flag_bad_sample(self) -> None:
-        self.state.bad_samples += 1
-        self.state.events |= _BAD_SAMPLE

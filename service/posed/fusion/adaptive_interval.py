@@ -118,13 +118,17 @@ class GyroInterval:
         s.error_rate += (self.error2 - s.error_rate * s.length_s) / (_ERROR_MEAN_S + s.length_s)
 
     def turn(self, u: float) -> None:
-        """Answer with the rotation from the interval's start to the share `u` of it; 1 is its end."""
+        """Answer with the rotation from the interval's start to the share `u` of it; 1 is its end.
+
+        Before the start (u < 0) the rate is taken to be what it begins with: a slope carried on over a sample that
+        came many intervals late would be a turn nobody made.
+        """
         if not self._own_time:
             u = 1.0
-        length = self.state.length_s
-        straight = length * u
-        bent = 0.5 * straight * (u - 1.0)
-        cone = u * u * u
+        inside = u if u > 0.0 else 0.0
+        straight = self.state.length_s * u
+        bent = 0.5 * straight * (inside - 1.0)
+        cone = inside * inside * inside
         self.x = straight * self._wx + bent * self._slope_x + cone * self._cone_x
         self.y = straight * self._wy + bent * self._slope_y + cone * self._cone_y
         self.z = straight * self._wz + bent * self._slope_z + cone * self._cone_z

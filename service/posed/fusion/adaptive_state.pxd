@@ -5,10 +5,14 @@ from posed.fusion.adaptive_field cimport FieldState
 from posed.fusion.adaptive_heading cimport HeadingState
 from posed.fusion.adaptive_interval cimport IntervalState
 from posed.fusion.adaptive_iron cimport IronState
+from posed.fusion.adaptive_repeats cimport Repeats
 from posed.fusion.adaptive_tilt cimport TiltState
 from posed.fusion.direction_cosines cimport DirectionCosines
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport HeldEvents
 from posed.fusion.rest cimport RestState
+
+cdef long long _GAP
+cdef long long _BAD_SAMPLE
 
 @cython.final
 cdef class AdaptiveState:
@@ -22,29 +26,17 @@ cdef class AdaptiveState:
     cdef public bint ahead
     cdef public bint has_gyro
     cdef public long long gyro_ns
-    cdef public long long gyro_same
-    cdef public double gyro_same_s
+    cdef public Repeats gyro_repeats
     cdef public bint unsteady
-    cdef public double gyro_x
-    cdef public double gyro_y
-    cdef public double gyro_z
     cdef public bint gyro_lost
     cdef public bint has_acc
     cdef public long long acc_ns
     cdef public long long acc_used_ns
-    cdef public long long acc_same
-    cdef public double acc_same_s
-    cdef public double acc_x
-    cdef public double acc_y
-    cdef public double acc_z
+    cdef public Repeats acc_repeats
     cdef public bint has_mag
     cdef public long long mag_ns
     cdef public long long mag_used_ns
-    cdef public long long mag_same
-    cdef public double mag_same_s
-    cdef public double mag_x
-    cdef public double mag_y
-    cdef public double mag_z
+    cdef public Repeats mag_repeats
     cdef public bint earth_gap
     cdef public bint free_fall
     cdef public long long events
@@ -58,3 +50,6 @@ cdef class AdaptiveState:
     cdef public FieldState earth
     cdef public IronState iron
     cdef public HeadingState heading
+
+    cpdef void flag_gap(self) noexcept
+    cpdef void flag_bad_sample(self) noexcept

@@ -1,21 +1,22 @@
 """What the adaptive DCM filter is told (AdaptiveParams) and all that it remembers (AdaptiveState)."""
 
 from dataclasses import dataclass, field
-from math import isfinite
 
-from posed.errors import InvalidArgumentError
+from posed.events import FilterStatus
 from posed.fusion.adaptive_bias import BiasParams, BiasState
 from posed.fusion.adaptive_field import FieldParams, FieldState
 from posed.fusion.adaptive_heading import HeadingParams, HeadingState
 from posed.fusion.adaptive_interval import IntervalParams, IntervalState
 from posed.fusion.adaptive_iron import IronParams, IronState
+from posed.fusion.adaptive_repeats import Repeats
 from posed.fusion.adaptive_tilt import TiltParams, TiltState
 from posed.fusion.direction_cosines import DirectionCosines
-from posed.fusion.held import HeldEvents
+from posed.fusion.event_arrays import HeldEvents
+from posed.fusion.filter import require_delays, require_positive
 from posed.fusion.rest import RestParams, RestState
 
-_MAX_DELAY_S = 0.1
-"""A measurement later than this is given up."""
+_GAP = int(FilterStatus.GAP)
+_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +35,11 @@ class AdaptiveParams:
     iron: IronParams = field(default_factory=IronParams)
     heading: HeadingParams = field(default_factory=HeadingParams)
     gyro_delay_s: float = 0.003
-    """s by which a gyroscope sample is older than its stamp: the group delay of the part's low-pass.
-
-    The pose looks ahead by it. MPU-6500 at 184 Hz: 2.9 ms; its accelerometer 5.8 ms.
-    """
+    """s by which a gyroscope sample is older than its stamp (see SensorErrors). The pose looks ahead by it."""
     acc_delay_s: float = 0.006
     """s, the same for the accelerometer."""
     mag_delay_s: float = 0.008
-    """s, the same for the magnetometer. AK8963: a conversion takes 7 ms."""
+    """s, the same for the magnetometer."""
     gyro_range: float = 35.0
     """rad/s a component can reach: beyond is a spike, at it the part is saturated. 2000 degrees/s, the widest of phone
     parts, is 34.9."""
@@ -51,14 +49,8 @@ class AdaptiveParams:
     """False takes none, as Android's game rotation vector: north is where the phone faced at the start."""
 
     def __post_init__(self) -> None:
-        if not (isfinite(self.gyro_range) and self.gyro_range > 0.0):
-            raise InvalidArgumentError(f"AdaptiveParams.gyro_range is {self.gyro_range}; give a finite number above 0")
-        for name in ("gyro_delay_s", "acc_delay_s", "mag_delay_s"):
-            value = getattr(self, name)
-            if not 0.0 <= value <= _MAX_DELAY_S:
-                raise InvalidArgumentError(
-                    f"AdaptiveParams.{name} is {value}; give seconds from 0 to {_MAX_DELAY_S}, usually thousandths"
-                )
+        require_positive(self, "gyro_range")
+        require_delays(self)
 
 
 @dataclass
@@ -67,8 +59,7 @@ class AdaptiveState:
 
     matrix turns device vectors into the levelled frame, which has a heading of its own, at start_ns: the start of the
     newest gyroscope interval. Times in ns, each valid only with its flag; of `acc_ns` and `mag_ns` the newest sample,
-    of `acc_used_ns` and `mag_used_ns` the newest not refused. `*_same`: samples that repeated the sensor's last value,
-    `*_same_s`: s of motion since that value came. held: measurements that wait for theirs.
+    of `acc_used_ns` and `mag_used_ns` the newest not refused. held: measurements that wait for theirs.
     """
 
     matrix: DirectionCosines = field(default_factory=DirectionCosines)
@@ -84,30 +75,18 @@ class AdaptiveState:
     ahead: bool = False
     has_gyro: bool = False
     gyro_ns: int = 0
-    gyro_same: int = 0
-    gyro_same_s: float = 0.0
+    gyro_repeats: Repeats = field(default_factory=Repeats)
     unsteady: bool = False
     """The newest acceleration differs from the one before by more than rounding: the stream has noise, or shakes."""
-    gyro_x: float = 0.0
-    gyro_y: float = 0.0
-    gyro_z: float = 0.0
     gyro_lost: bool = False
     has_acc: bool = False
     acc_ns: int = 0
     acc_used_ns: int = 0
-    acc_same: int = 0
-    acc_same_s: float = 0.0
-    acc_x: float = 0.0
-    acc_y: float = 0.0
-    acc_z: float = 0.0
+    acc_repeats: Repeats = field(default_factory=Repeats)
     has_mag: bool = False
     mag_ns: int = 0
     mag_used_ns: int = 0
-    mag_same: int = 0
-    mag_same_s: float = 0.0
-    mag_x: float = 0.0
-    mag_y: float = 0.0
-    mag_z: float = 0.0
+    mag_repeats: Repeats = field(default_factory=Repeats)
     earth_gap: bool = False
     """No field has been judged since a gap."""
     free_fall: bool = False
@@ -130,3 +109,13 @@ class AdaptiveState:
         state.bias.estimate.start(params.bias.std**2)
         state.iron.estimate.start(params.iron.std**2)
         return state
+
+    def flag_gap(self) -> None:
+        """Count a gap or a sample out of order, and have the next pose say so."""
+        self.gaps += 1
+        self.events |= _GAP
+
+    def flag_bad_sample(self) -> None:
+        """Count a sample refused, and have the next pose say so."""
+        self.bad_samples += 1
+        self.events |= _BAD_SAMPLE

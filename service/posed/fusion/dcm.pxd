@@ -3,7 +3,7 @@ cimport cython
 from posed.fusion.dcm_state cimport DcmState
 from posed.fusion.direction_cosines cimport DirectionCosines
 from posed.fusion.gate cimport MagneticGate
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport EventArrays, HeldEvents
 from posed.fusion.rest cimport RestBias, RestState
 
 cdef extern from "math.h":
@@ -13,8 +13,6 @@ cdef extern from "math.h":
 cdef long long _ACCELEROMETER
 cdef long long _MAGNETIC_FIELD
 cdef long long _GYROSCOPE
-cdef long long _GAP
-cdef long long _BAD_SAMPLE
 cdef long long _MAX_STEP_NS
 cdef long long _MAX_TIME_NS
 cdef double _MAX_STEP_S
@@ -40,7 +38,10 @@ cdef class DcmFilter:
     cdef RestBias _rest
     cdef MagneticGate _gate
 
-    @cython.locals(sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double)
+    @cython.locals(
+        sensor_type=cython.longlong, timestamp_ns=cython.longlong, x=double, y=double, z=double,
+        rows=EventArrays, k=Py_ssize_t,
+    )
     cpdef update_batch(self, events)
 
     cdef void _take(self, long long sensor_type, long long t, double x, double y, double z) noexcept
@@ -58,5 +59,3 @@ cdef class DcmFilter:
     cdef void _correct_heading(self, long long t, double x, double y, double z) noexcept
     cdef double _heading_variance(self) noexcept
     cdef void _restart(self, long long t) noexcept
-    cdef void _flag_gap(self) noexcept
-    cdef void _flag_bad_sample(self) noexcept

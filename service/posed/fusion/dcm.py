@@ -21,9 +21,10 @@ from typing import Any
 from posed.errors import InvalidArgumentError
 from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
 from posed.fusion.dcm_state import DcmParams, DcmState
+from posed.fusion.event_arrays import MAX_HELD, EventArrays
 from posed.fusion.gate import MagneticGate
-from posed.fusion.held import MAX_HELD
 from posed.fusion.rest import RestBias
+from posed.fusion.saved import filled, plain
 
 __all__ = ["DcmFilter", "DcmParams"]
 
@@ -35,8 +36,6 @@ _AT_REST = int(FilterStatus.AT_REST)
 _MAGNETIC_DISTURBANCE = int(FilterStatus.MAGNETIC_DISTURBANCE)
 _GYRO_LOST = int(FilterStatus.GYRO_LOST)
 _FREE_FALL = int(FilterStatus.FREE_FALL)
-_GAP = int(FilterStatus.GAP)
-_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 _MAX_STEP_NS = 500_000_000
 """A longer step of time is a gap, and a measurement is held no longer for its gyroscope sample."""
@@ -84,7 +83,12 @@ class DcmFilter:
         self._take(int(sensor_type), int(timestamp_ns), float(x), float(y), float(z))
 
     def update_batch(self, events: Iterable[FlatEvent]) -> None:
-        """Take events in the order given, each as by `update`."""
+        """Take events in the order given, each as by `update`; EventArrays are taken fastest."""
+        if isinstance(events, EventArrays):
+            rows = events
+            for k in range(rows.count):
+                self._take(rows.sensor_type[k], rows.timestamp_ns[k], rows.x[k], rows.y[k], rows.z[k])
+            return
         for sensor_type, timestamp_ns, x, y, z in events:
             self._take(sensor_type, timestamp_ns, x, y, z)
 
@@ -122,7 +126,7 @@ class DcmFilter:
 
     def save(self) -> dict[str, Any]:
         """Return the state as values that JSON can hold."""
-        return {"filter": self.name, "state": self.state.to_dict()}
+        return {"filter": self.name, "state": plain(self.state)}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `save` returned; raises InvalidArgumentError for anything else."""
@@ -130,7 +134,7 @@ class DcmFilter:
             raise InvalidArgumentError(
                 f"the saved state is of filter {saved.get('filter')!r}; restore it into that one, not {self.name!r}"
             )
-        self._use(DcmState.from_dict(saved.get("state")))
+        self._use(filled(DcmState, saved.get("state"), "state"))
 
     def _use(self, state: DcmState) -> None:
         self.state = state
@@ -144,7 +148,7 @@ class DcmFilter:
         elif sensor_type != _ACCELEROMETER and sensor_type != _MAGNETIC_FIELD:
             return
         elif not (x * x + y * y + z * z < _MAX_MEASUREMENT2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
-            self._flag_bad_sample()
+            s.flag_bad_sample()
         elif s.gyro_lost:
             self._measure_alone(sensor_type, t, x, y, z)
         elif not s.has_gyro or t > s.gyro_ns:
@@ -154,12 +158,12 @@ class DcmFilter:
         elif s.gyro_ns - t <= _MAX_STEP_NS:
             self._measure(sensor_type, t, x, y, z)
         else:
-            self._flag_gap()
+            s.flag_gap()
 
     def _take_rate(self, t: int, x: float, y: float, z: float) -> None:
         s = self.state
         if not (x * x + y * y + z * z < _MAX_RATE2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
-            self._flag_bad_sample()
+            s.flag_bad_sample()
             return
         came_back = s.gyro_lost
         s.gyro_lost = False
@@ -172,7 +176,7 @@ class DcmFilter:
         elif t <= s.time_ns:
             # Measurements that went on alone may have passed the first sample of a gyroscope that came back.
             if not came_back:
-                self._flag_gap()
+                s.flag_gap()
             return
         dt = (t - s.time_ns) * 1e-9
         s.has_gyro = True
@@ -193,7 +197,7 @@ class DcmFilter:
                 # Still ahead: it moves up, never past a row not yet looked at.
                 held.add(held.sensor_type[k], time_ns, held.x[k], held.y[k], held.z[k])
             else:
-                self._flag_gap()
+                s.flag_gap()
         self._propagate_to(t)
         if dt > 0.0:
             self._rest.take_rate(x, y, z, dt)
@@ -251,7 +255,7 @@ class DcmFilter:
         dt = _FIRST_STEP_S
         if s.has_acc:
             if t <= s.acc_ns:
-                self._flag_gap()
+                s.flag_gap()
                 return
             dt = min((t - s.acc_ns) * 1e-9, _MAX_STEP_S)
         s.has_acc = True
@@ -290,7 +294,7 @@ class DcmFilter:
         dt = _FIRST_STEP_S
         if s.has_mag:
             if t <= s.mag_ns:
-                self._flag_gap()
+                s.flag_gap()
                 return
             dt = min((t - s.mag_ns) * 1e-9, _MAX_STEP_S)
         s.has_mag = True
@@ -304,7 +308,7 @@ class DcmFilter:
         vertical = x * ux + y * uy + z * uz
         horizontal2 = norm2 - vertical * vertical
         if not horizontal2 > _MIN_HORIZONTAL2 * norm2:
-            self._flag_bad_sample()
+            s.flag_bad_sample()
             return
         horizontal = sqrt(horizontal2)
         noise = (self._mag_white + self._mag_moving / dt) / horizontal2
@@ -342,7 +346,7 @@ class DcmFilter:
         What is held was measured before the gap or in it, at an attitude nobody knows.
         """
         s = self.state
-        self._flag_gap()
+        s.flag_gap()
         s.held.count = 0
         s.time_ns = t
         s.has_up = False
@@ -351,11 +355,3 @@ class DcmFilter:
         s.has_mag = False
         s.has_gyro = False
         self._rest.moved()
-
-    def _flag_gap(self) -> None:
-        self.state.gaps += 1
-        self.state.events |= _GAP
-
-    def _flag_bad_sample(self) -> None:
-        self.state.bad_samples += 1
-        self.state.events |= _BAD_SAMPLE

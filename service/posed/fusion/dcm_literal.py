@@ -33,6 +33,7 @@ from posed.errors import InvalidArgumentError
 from posed.events import STANDARD_GRAVITY, FilterStatus, FlatEvent, Orientation, SensorType
 from posed.fusion.dcm_literal_state import LiteralParams, LiteralState
 from posed.fusion.direction_cosines import DirectionCosines
+from posed.fusion.saved import filled, plain
 
 __all__ = ["LiteralFilter", "LiteralParams"]
 
@@ -108,7 +109,7 @@ class LiteralFilter:
 
     def save(self) -> dict[str, Any]:
         """Return the state as values that JSON can hold."""
-        return {"filter": self.name, "state": self.state.to_dict()}
+        return {"filter": self.name, "state": plain(self.state)}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue from what `save` returned; raises InvalidArgumentError for anything else."""
@@ -116,14 +117,14 @@ class LiteralFilter:
             raise InvalidArgumentError(
                 f"the saved state is of filter {saved.get('filter')!r}; restore it into that one, not {self.name!r}"
             )
-        self.state = LiteralState.from_dict(saved.get("state"))
+        self.state = filled(LiteralState, saved.get("state"), "state")
 
     def _take(self, sensor_type: int, t: int, x: float, y: float, z: float) -> None:
         if sensor_type not in (_ACCELEROMETER, _MAGNETIC_FIELD, _GYROSCOPE):
             return
         limit2 = _MAX_RATE2 if sensor_type == _GYROSCOPE else _MAX_MEASUREMENT2
         if not (x * x + y * y + z * z < limit2 and -_MAX_TIME_NS < t < _MAX_TIME_NS):
-            self._flag_bad_sample()
+            self.state.flag_bad_sample()
         elif sensor_type == _GYROSCOPE:
             self._take_rate(t, x, y, z)
         else:
@@ -134,11 +135,11 @@ class LiteralFilter:
         s = self.state
         step_ns = t - s.gyro_ns if s.has_gyro else 0
         if s.has_gyro and -_MAX_STEP_NS <= step_ns <= 0:
-            self._flag_gap()
+            s.flag_gap()
             return
         if abs(step_ns) > _MAX_STEP_NS:
             # Far back counts as a gap too: a source whose clock was set back must not lock the filter out.
-            self._flag_gap()
+            s.flag_gap()
             s.has_north = s.has_acc = s.has_mag = False
             step_ns = 0
         s.has_gyro = True
@@ -185,7 +186,7 @@ class LiteralFilter:
         s = self.state
         rows = _orthonormal(s)
         if rows is None:
-            self._flag_bad_sample()
+            s.flag_bad_sample()
             s.started = s.has_north = False
             return
         (s.r11, s.r12, s.r13), (s.r21, s.r22, s.r23), (s.r31, s.r32, s.r33) = rows
@@ -194,10 +195,10 @@ class LiteralFilter:
         s = self.state
         known, last = (s.has_acc, s.acc_ns) if sensor_type == _ACCELEROMETER else (s.has_mag, s.mag_ns)
         if (known and 0 <= last - t <= _MAX_STEP_NS) or (s.has_gyro and s.gyro_ns - t > _MAX_STEP_NS):
-            self._flag_gap()
+            s.flag_gap()
             return
         if s.has_gyro and t - s.gyro_ns > _MAX_STEP_NS:
-            self._flag_gap()
+            s.flag_gap()
             s.has_gyro = s.has_north = s.has_acc = s.has_mag = False
             s.gyro_lost = True
             s.rate_x = s.rate_y = s.rate_z = 0.0
@@ -209,7 +210,7 @@ class LiteralFilter:
             if s.has_acc:
                 self._correct_tilt(dt, norm, x / norm, y / norm, z / norm)
             else:
-                self._flag_bad_sample()
+                s.flag_bad_sample()
         else:
             s.has_mag = True
             s.mag_ns = t
@@ -238,7 +239,7 @@ class LiteralFilter:
         along, across = _level(s.column, up, (x, y, z))
         horizontal2 = along * along + across * across
         if not horizontal2 > _MIN_NORM2:
-            self._flag_bad_sample()
+            s.flag_bad_sample()
             return
         noise = (self.params.noise.mag_std**2 + self.params.field_density**2 / dt) / horizontal2
         # Counted from east: the level axes see a field that points north.
@@ -263,14 +264,6 @@ class LiteralFilter:
     def _set(self, columns: Sequence[_Vector]) -> None:
         s = self.state
         (s.r11, s.r21, s.r31), (s.r12, s.r22, s.r32), (s.r13, s.r23, s.r33) = columns
-
-    def _flag_gap(self) -> None:
-        self.state.gaps += 1
-        self.state.events |= FilterStatus.GAP.value
-
-    def _flag_bad_sample(self) -> None:
-        self.state.bad_samples += 1
-        self.state.events |= FilterStatus.BAD_SAMPLE.value
 
 
 def _corrected(value: float, variance: float, measured: float, noise: float) -> tuple[float, float]:

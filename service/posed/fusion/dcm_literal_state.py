@@ -1,17 +1,19 @@
 """What the literal DCM filter is told (LiteralParams) and all that it remembers (LiteralState)."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
-from posed.fusion.filter import SensorNoise, require_positive
-from posed.fusion.saved import filled, plain
+from posed.events import FilterStatus
+from posed.fusion.filter import SensorErrors, require_positive
+
+_GAP = int(FilterStatus.GAP)
+_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)
 class LiteralParams:
     """Sampling variances, those of DcmParams: what differs from `dcm` is the equations and not the tuning."""
 
-    noise: SensorNoise = field(default_factory=SensorNoise)
+    noise: SensorErrors = field(default_factory=SensorErrors)
     """White noise of the parts."""
     rotation_density: float = 0.02
     """rad/s/sqrt(Hz), error of the measured rate in motion."""
@@ -68,12 +70,12 @@ class LiteralState:
     bad_samples: int = 0
     gaps: int = 0
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the state as a dict of numbers and booleans."""
-        saved: dict[str, Any] = plain(self)
-        return saved
+    def flag_gap(self) -> None:
+        """Count a gap or a sample out of order, and have the next pose say so."""
+        self.gaps += 1
+        self.events |= _GAP
 
-    @classmethod
-    def from_dict(cls, saved: Any) -> "LiteralState":
-        """Return the state that `to_dict` gave; raises InvalidArgumentError for anything else."""
-        return filled(cls, saved, "state")
+    def flag_bad_sample(self) -> None:
+        """Count a sample refused, and have the next pose say so."""
+        self.bad_samples += 1
+        self.events |= _BAD_SAMPLE

@@ -2,8 +2,11 @@ cimport cython
 
 from posed.fusion.direction_cosines cimport DirectionCosines
 from posed.fusion.gate cimport GateState
-from posed.fusion.held cimport HeldEvents
+from posed.fusion.event_arrays cimport HeldEvents
 from posed.fusion.rest cimport RestState
+
+cdef long long _GAP
+cdef long long _BAD_SAMPLE
 
 @cython.final
 cdef class DcmState:
@@ -33,3 +36,6 @@ cdef class DcmState:
     cdef public HeldEvents held
     cdef public RestState rest
     cdef public GateState gate
+
+    cpdef void flag_gap(self) noexcept
+    cpdef void flag_bad_sample(self) noexcept

@@ -1,15 +1,16 @@
 """What the DCM filter is told (DcmParams) and all that it remembers (DcmState)."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
-from posed.events import STANDARD_GRAVITY
+from posed.events import STANDARD_GRAVITY, FilterStatus
 from posed.fusion.direction_cosines import DirectionCosines
-from posed.fusion.filter import SensorNoise, require_positive
+from posed.fusion.event_arrays import HeldEvents
+from posed.fusion.filter import SensorErrors, require_positive
 from posed.fusion.gate import GateParams, GateState
-from posed.fusion.held import HeldEvents
 from posed.fusion.rest import RestParams, RestState
-from posed.fusion.saved import filled, plain
+
+_GAP = int(FilterStatus.GAP)
+_BAD_SAMPLE = int(FilterStatus.BAD_SAMPLE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class DcmParams:
     of the parts alone.
     """
 
-    noise: SensorNoise = field(default_factory=SensorNoise)
+    noise: SensorErrors = field(default_factory=SensorErrors)
     """White noise of the parts."""
     rotation_density: float = 0.02
     """rad/s/sqrt(Hz), error of the measured rate in motion. Larger follows gravity and north faster."""
@@ -86,12 +87,12 @@ class DcmState:
         """Return the state before the first event."""
         return cls(rest=RestState(bias_variance=params.rest.bias_std**2))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the state as dicts, lists, numbers and booleans."""
-        saved: dict[str, Any] = plain(self)
-        return saved
+    def flag_gap(self) -> None:
+        """Count a gap or a sample out of order, and have the next pose say so."""
+        self.gaps += 1
+        self.events |= _GAP
 
-    @classmethod
-    def from_dict(cls, saved: Any) -> "DcmState":
-        """Return the state that `to_dict` gave; raises InvalidArgumentError for anything else."""
-        return filled(cls, saved, "state")
+    def flag_bad_sample(self) -> None:
+        """Count a sample refused, and have the next pose say so."""
+        self.bad_samples += 1
+        self.events |= _BAD_SAMPLE

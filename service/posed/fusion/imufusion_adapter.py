@@ -11,7 +11,7 @@ import numpy as np
 
 from posed.errors import InvalidStateError, MissingExtraError
 from posed.events import STANDARD_GRAVITY, FilterStatus, FlatEvent, Float64Array, SensorType
-from posed.fusion.filter import SensorNoise
+from posed.fusion.filter import SensorErrors
 from posed.fusion.paced import UNKNOWN_BIAS, PacedFilter, Periods
 
 try:
@@ -34,7 +34,7 @@ class ImufusionFilter(PacedFilter):
 
     name = "imufusion"
 
-    def __init__(self, noise: SensorNoise | None = None) -> None:
+    def __init__(self, noise: SensorErrors | None = None) -> None:
         """Take no account of `noise`: the package has no such setting."""
         super().__init__()
         self._ahrs: Any = None

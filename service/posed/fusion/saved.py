@@ -7,7 +7,7 @@ from typing import Any, TypeVar, cast
 
 from posed.errors import InvalidArgumentError
 from posed.events import SensorType
-from posed.fusion.held import MAX_HELD, HeldEvents
+from posed.fusion.event_arrays import MAX_HELD, HeldEvents
 
 _T = TypeVar("_T")
 

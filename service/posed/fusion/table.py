@@ -4,11 +4,11 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 
 from posed.errors import InvalidArgumentError
-from posed.fusion.filter import OrientationFilter, SensorNoise
+from posed.fusion.filter import OrientationFilter, SensorErrors
 
 
-def make_filter(name: str, noise: SensorNoise | None = None) -> OrientationFilter:
-    """Return a fresh filter; `noise` is that of the device profile, the default of SensorNoise without.
+def make_filter(name: str, errors: SensorErrors | None = None) -> OrientationFilter:
+    """Return a fresh filter; `errors` are those of the device profile, SensorErrors' defaults without.
 
     Raises InvalidArgumentError when no filter has this name, MissingExtraError when its package is not installed.
     """
@@ -16,52 +16,61 @@ def make_filter(name: str, noise: SensorNoise | None = None) -> OrientationFilte
     if maker is None:
         known = ", ".join(sorted({*FILTERS, *PACKAGED}))
         raise InvalidArgumentError(f"no filter is named {name!r}; choose one of {known}")
-    return maker(noise if noise is not None else SensorNoise())
+    return maker(errors if errors is not None else SensorErrors())
 
 
-def _packaged(name: str) -> Callable[[SensorNoise], OrientationFilter] | None:
+def _packaged(name: str) -> Callable[[SensorErrors], OrientationFilter] | None:
     if name not in PACKAGED:
         return None
     module, attribute = PACKAGED[name]
-    maker: Callable[[SensorNoise], OrientationFilter] = getattr(import_module(module), attribute)
+    maker: Callable[[SensorErrors], OrientationFilter] = getattr(import_module(module), attribute)
     return maker
 
 
 # Each imports its filter when it is wanted: the compiled code of those that are not would stay in the daemon's memory.
-def _dcm(noise: SensorNoise) -> OrientationFilter:
+def _dcm(errors: SensorErrors) -> OrientationFilter:
     from posed.fusion.dcm import DcmFilter, DcmParams
 
-    return DcmFilter(DcmParams(noise=noise))
+    return DcmFilter(DcmParams(noise=errors))
 
 
-def _literal(noise: SensorNoise) -> OrientationFilter:
+def _literal(errors: SensorErrors) -> OrientationFilter:
     from posed.fusion.dcm_literal import LiteralFilter, LiteralParams
 
-    return LiteralFilter(LiteralParams(noise=noise))
+    return LiteralFilter(LiteralParams(noise=errors))
 
 
-def _adaptive(noise: SensorNoise) -> OrientationFilter:
-    """The noise of the parts is far below what this filter reckons with, so it is not asked for."""
-    from posed.fusion.adaptive import AdaptiveFilter
-
-    return AdaptiveFilter()
+def _adaptive(errors: SensorErrors) -> OrientationFilter:
+    return _adaptive_form("dcm-adaptive", errors)
 
 
-def _game(noise: SensorNoise) -> OrientationFilter:
+def _game(errors: SensorErrors) -> OrientationFilter:
+    return _adaptive_form("game", errors, use_magnetometer=False)
+
+
+def _geomag(errors: SensorErrors) -> OrientationFilter:
+    return _adaptive_form("geomag", errors, use_gyroscope=False)
+
+
+def _adaptive_form(
+    name: str, errors: SensorErrors, *, use_gyroscope: bool = True, use_magnetometer: bool = True
+) -> OrientationFilter:
+    """The noise of the parts is far below what this filter reckons with; their delays it makes good."""
     from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
 
-    return AdaptiveFilter(AdaptiveParams(use_magnetometer=False), name="game")
-
-
-def _geomag(noise: SensorNoise) -> OrientationFilter:
-    from posed.fusion.adaptive import AdaptiveFilter, AdaptiveParams
-
-    return AdaptiveFilter(AdaptiveParams(use_gyroscope=False), name="geomag")
+    params = AdaptiveParams(
+        gyro_delay_s=errors.gyro_delay_s,
+        acc_delay_s=errors.acc_delay_s,
+        mag_delay_s=errors.mag_delay_s,
+        use_gyroscope=use_gyroscope,
+        use_magnetometer=use_magnetometer,
+    )
+    return AdaptiveFilter(params, name=name)
 
 
 DEFAULT_FILTER = "dcm-adaptive"
 
-FILTERS: Mapping[str, Callable[[SensorNoise], OrientationFilter]] = {
+FILTERS: Mapping[str, Callable[[SensorErrors], OrientationFilter]] = {
     "dcm": _dcm,
     "dcm-adaptive": _adaptive,
     "dcm-literal": _literal,

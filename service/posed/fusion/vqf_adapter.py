@@ -8,7 +8,7 @@ import numpy as np
 
 from posed.errors import InvalidArgumentError, MissingExtraError
 from posed.events import FilterStatus, FlatEvent, Float64Array, SensorType
-from posed.fusion.filter import SensorNoise
+from posed.fusion.filter import SensorErrors
 from posed.fusion.paced import UNKNOWN_BIAS, PacedFilter, Periods
 
 try:
@@ -26,7 +26,7 @@ class VqfFilter(PacedFilter):
 
     name = "vqf"
 
-    def __init__(self, noise: SensorNoise | None = None) -> None:
+    def __init__(self, noise: SensorErrors | None = None) -> None:
         """Take no account of `noise`: VQF's defaults are meant for all sensors."""
         super().__init__()
         self._vqf: Any = None

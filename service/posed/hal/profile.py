@@ -57,6 +57,8 @@ class SensorProfile:
     """Random walk of the bias, unit/sqrt(s): its standard deviation after t seconds is this times sqrt(t)."""
     timestamp_jitter_s: float = 0.0
     """Standard deviation of a timestamp about its even spacing, seconds."""
+    delay_s: float = 0.0
+    """Group delay of the part's low-pass: seconds by which a sample is older than its stamp, at most 0.1."""
     fifo_reserved: int = 0
     fifo_max: int = 0
     residual: ResidualErrors = ResidualErrors()
@@ -360,6 +362,7 @@ def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:
         noise_density=table.number("noise_density"),
         bias_walk=table.number("bias_walk", default=0.0),
         timestamp_jitter_s=table.number("timestamp_jitter_s", default=0.0),
+        delay_s=table.number("delay_s", default=0.0),
         fifo_reserved=table.integer("fifo_reserved", low=0, default=0),
         fifo_max=table.integer("fifo_max", low=0, default=0),
         residual=ResidualErrors(**{bound: residual.number(bound, default=0.0) for bound in bounds}),
@@ -368,6 +371,8 @@ def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:
     table.finish()
     if sensor.fifo_reserved > sensor.fifo_max:
         raise table.refusal("fifo_reserved", sensor.fifo_reserved, f"at most fifo_max, {sensor.fifo_max}")
+    if sensor.delay_s > _LONGEST_DELAY_S:
+        raise table.refusal("delay_s", sensor.delay_s, f"seconds up to {_LONGEST_DELAY_S}, usually thousandths")
     if sensor.resolution > sensor.max_range:
         raise table.refusal("resolution", sensor.resolution, f"at most max_range, {sensor.max_range}")
     if sensor.rates_hz[-1] > _HIGHEST_RATE_HZ:
@@ -375,6 +380,8 @@ def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:
     return sensor
 
 
+_LONGEST_DELAY_S = 0.1
+"""What filters make good; the low-passes of phone parts take a tenth of it."""
 _HIGHEST_RATE_HZ = 1000
 """Android's sensor service asks no sensor for a period below 1 ms (SensorDevice.cpp, MINIMUM_EVENTS_PERIOD)."""
 

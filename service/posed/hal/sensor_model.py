@@ -38,9 +38,9 @@ THESSALONIKI = Site(declination=radians(5.5), dip=radians(57.0), strength_ut=46.
 class SensorModel:
     """One part of a phone, its constant errors drawn from the seed.
 
-    reading = E truth + bias(t) + white noise, as raw readings (before the profile's calibration), rounded to the part's
-    resolution and limited to its range. What it reports at an instant depends on the seed, the rate and the instant
-    alone.
+    reading(t) = E truth(t - delay) + bias(t) + white noise, as raw readings (before the profile's calibration), rounded
+    to the part's resolution and limited to its range. What it reports at an instant depends on the seed, the rate and
+    the instant alone.
     """
 
     def __init__(
@@ -84,10 +84,12 @@ class SensorModel:
         return grid_ns[1:] + np.rint(jitter).astype(np.int64), self._digitised(self._calibration.invert(reading))
 
     def _truth(self, t: Float64Array) -> Float64Array:
-        """Return what an ideal part reads at t[1:] (s; a gyroscope: on the mean since the instant before)."""
+        """Return what an ideal part stamps t[1:] (s; a gyroscope: the mean since the instant before)."""
+        # Before the motion began the phone was where it began.
+        felt = np.maximum(t - self._part.delay_s, 0.0)
         if self._part.type is SensorType.GYROSCOPE:
-            return rotation.increments(self._script.attitude(t)) / np.diff(t)[:, np.newaxis]
-        t = t[1:]
+            return rotation.increments(self._script.attitude(felt)) / np.diff(t)[:, np.newaxis]
+        t = felt[1:]
         if self._part.type is SensorType.ACCELEROMETER:
             return rotation.to_device(self._script.attitude(t), self._script.acceleration(t) + _UP_G)
         disturbance = self._script.disturbance(t)

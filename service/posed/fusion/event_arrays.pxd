@@ -1,6 +1,16 @@
 cimport cython
 
 @cython.final
+cdef class EventArrays:
+    cdef readonly Py_ssize_t count
+    cdef tuple _given
+    cdef const long long[::1] sensor_type
+    cdef const long long[::1] timestamp_ns
+    cdef const double[::1] x
+    cdef const double[::1] y
+    cdef const double[::1] z
+
+@cython.final
 cdef class HeldEvents:
     cdef public Py_ssize_t count
     cdef long long[::1] sensor_type
