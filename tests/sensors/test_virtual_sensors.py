@@ -11,7 +11,7 @@ from posed.errors import InvalidArgumentError
 from posed.events import EventColumn, Position, ReportingMode, SensorType
 from posed.hal import open_source
 from posed.hal.profile import load_profile
-from posed.sensors import Client, SensorService, device_noise, make_device_filter
+from posed.sensors import Client, SensorService, device_errors, make_device_filter
 from posed.sensors.connection import SensorEventConnection
 from posed.sensors.declination import declination_at
 from posed.sensors.detectors import DeviceOrientation, Persistence, SignificantMotion, Tilt
@@ -35,7 +35,7 @@ class Phone:
             make_device_filter("dcm-adaptive", loaded),
             self.clock,
             declination=lambda: _DECLINATION,
-            noise=device_noise(loaded),
+            errors=device_errors(loaded),
         )
         self.connection = self.service.connect(_WALKER)
 

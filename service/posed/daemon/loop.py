@@ -28,7 +28,7 @@ from posed.daemon.waiting import Waiter
 from posed.hal import open_source
 from posed.hal.profile import load_profile
 from posed.proto import events_pb2
-from posed.sensors import SensorService, device_noise, make_device_filter
+from posed.sensors import SensorService, device_errors, make_device_filter
 from posed.sensors.declination import declination_at
 
 _log = logging.getLogger(__name__)
@@ -74,7 +74,7 @@ class _Daemon:
             config.position,
             aligned=config.aligned,
             declination=declination_at(config.position),
-            noise=device_noise(profile),
+            errors=device_errors(profile),
         )
         self._context = context()
         self._server = Server(control_path(directory), self._context)

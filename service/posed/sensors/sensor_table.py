@@ -5,7 +5,7 @@ from collections.abc import Hashable, Iterable
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError
 from posed.events import EventBatch, EventColumn, SensorInfo, SensorType
-from posed.fusion.filter import SensorNoise
+from posed.fusion.filter import SensorErrors
 from posed.sensors.active_sensor import ActiveSensor
 from posed.sensors.arbitration import BatchParams, arbitrate, clamp_period_ns
 from posed.sensors.device import SensorDevice
@@ -24,10 +24,10 @@ class SensorTable:
     """The source's sensors, the virtual ones computed from them, and the dynamic ones, by handle."""
 
     def __init__(
-        self, device: SensorDevice, clock: Clock, noise: SensorNoise, *, knows_true_north: bool = False
+        self, device: SensorDevice, clock: Clock, errors: SensorErrors, *, knows_true_north: bool = False
     ) -> None:
-        """noise: of the device's parts, for the filters of virtual sensors. knows_true_north: as `virtual_sensors`."""
-        self._noise = noise
+        """errors: of the device's parts, for the filters of virtual sensors. knows_true_north: as `virtual_sensors`."""
+        self._errors = errors
         self._device = device
         self._clock = clock
         physical = device.sensors
@@ -151,5 +151,5 @@ class SensorTable:
 
     def _computation(self, info: SensorInfo) -> Computation:
         if info.handle not in self._computations:
-            self._computations[info.handle] = make_computation(info.type, self._noise)
+            self._computations[info.handle] = make_computation(info.type, self._errors)
         return self._computations[info.handle]

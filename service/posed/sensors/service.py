@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
 from posed.events import Pose, Position, ReportingMode, SensorInfo, SensorType
-from posed.fusion.filter import OrientationFilter, SensorNoise
+from posed.fusion.filter import OrientationFilter, SensorErrors
 from posed.hal.source import SensorSource
 from posed.sensors.active_sensor import ActiveSensor
 from posed.sensors.arbitration import clamp_period_ns
@@ -37,19 +37,21 @@ class SensorService:
         *,
         aligned: bool = False,
         declination: Callable[[], float] | None = None,
-        noise: SensorNoise | None = None,
+        errors: SensorErrors | None = None,
     ) -> None:
         """Fuse with this filter.
 
         aligned: turn each pose on to its grid instant by the newest angular rate. declination: returns that of the
-        place, rad, east positive; without it there is no heading sensor. noise: of the device's parts, for the filters
+        place, rad, east positive; without it there is no heading sensor. errors: of the device's parts, for the filters
         of virtual sensors.
         """
         self._clock = clock
         self._device = SensorDevice(source, clock)
         self.orientation_filter = orientation_filter
         self._fusion = PoseFusion(orientation_filter, clock, position, aligned, declination or (lambda: 0.0))
-        self._table = SensorTable(self._device, clock, noise or SensorNoise(), knows_true_north=declination is not None)
+        self._table = SensorTable(
+            self._device, clock, errors or SensorErrors(), knows_true_north=declination is not None
+        )
         self._connections: dict[SensorEventConnection, None] = {}
         self.registrations = RegistrationLog()
         self._now_ns = 0

@@ -6,7 +6,7 @@ import numpy as np
 
 from posed.events import EventColumn, FlatEvent, SensorType
 from posed.fusion import make_filter
-from posed.fusion.filter import OrientationFilter, SensorNoise
+from posed.fusion.filter import OrientationFilter, SensorErrors
 
 _FILTERS = {SensorType.GAME_ROTATION_VECTOR: "game", SensorType.GEOMAGNETIC_ROTATION_VECTOR: "geomag"}
 _HIGH_ACCURACY = 3
@@ -15,15 +15,15 @@ _HIGH_ACCURACY = 3
 class RotationVector:
     """x, y, z, w at each accelerometer event, and of the geomagnetic one the heading's accuracy, rad."""
 
-    def __init__(self, kind: SensorType, noise: SensorNoise) -> None:
-        self._noise = noise
+    def __init__(self, kind: SensorType, errors: SensorErrors) -> None:
+        self._errors = errors
         self._name = _FILTERS[kind]
         self._has_heading = kind is SensorType.GEOMAGNETIC_ROTATION_VECTOR
-        self._filter: OrientationFilter = make_filter(self._name, noise)
+        self._filter: OrientationFilter = make_filter(self._name, errors)
 
     def restart(self) -> None:
         """Begin with a fresh filter: how the phone was turned meanwhile nobody saw."""
-        self._filter = make_filter(self._name, self._noise)
+        self._filter = make_filter(self._name, self._errors)
 
     def take(self, events: Sequence[FlatEvent]) -> EventColumn | None:
         """Feed the filter, stopping behind every accelerometer event."""

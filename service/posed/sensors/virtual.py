@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Protocol
 
 from posed.events import STANDARD_GRAVITY, EventColumn, FlatEvent, ReportingMode, SensorInfo, SensorType
-from posed.fusion.filter import SensorNoise
+from posed.fusion.filter import SensorErrors
 
 FUSION_INPUTS = (SensorType.ACCELEROMETER, SensorType.GYROSCOPE, SensorType.MAGNETIC_FIELD)
 LEAD = SensorType.ACCELEROMETER
@@ -47,11 +47,11 @@ class Computation(Protocol):
         """Begin anew, as the sensor was off: what came before says nothing of what comes."""
 
 
-def make_computation(kind: SensorType, noise: SensorNoise) -> Computation:
+def make_computation(kind: SensorType, errors: SensorErrors) -> Computation:
     """Make the computation of a virtual sensor that is not fused; its module is loaded only now."""
     if kind in (SensorType.GAME_ROTATION_VECTOR, SensorType.GEOMAGNETIC_ROTATION_VECTOR):
         module = import_module("posed.sensors.vectors")
-        made: Computation = module.RotationVector(kind, noise)
+        made: Computation = module.RotationVector(kind, errors)
     elif kind in (SensorType.STEP_DETECTOR, SensorType.STEP_COUNTER):
         made = import_module("posed.sensors.steps").make(kind)
     else:
