@@ -43,23 +43,14 @@ EX_TEMPFAIL = 75
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one subcommand and return the exit code; `--help`, `--version` and usage errors raise SystemExit."""
     arguments = list(sys.argv[1:] if argv is None else argv)
-    parser = _parser()
     if not arguments:
-        parser.print_help(sys.stderr)
+        _parser().print_help(sys.stderr)
         return EX_USAGE
     # Options before the subcommand take no value, so that the first word decides alone.
-    command: str = parser.parse_args(arguments[:1]).command
-    module_name, summary = COMMANDS[command]
+    command: str = _parser().parse_args(arguments[:1]).command
     try:
-        module = import_module(module_name)
-        own = argparse.ArgumentParser(
-            prog=f"posed {command}",
-            description=f"{summary[0].upper()}{summary[1:]}.",
-            formatter_class=_HelpFormatter,
-            allow_abbrev=False,
-        )
-        module.add_arguments(own)
-        code: int = module.run(own.parse_args(arguments[1:]))
+        module = import_module(COMMANDS[command][0])
+        code: int = module.run(_parsed(command, module, arguments[1:]))
         sys.stdout.flush()
         return code
     except PosedError as error:
@@ -74,6 +65,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"posed: error: {error}", file=sys.stderr)
         return 1
+
+
+def _parsed(command: str, module: Any, arguments: Sequence[str]) -> argparse.Namespace:
+    """Return a subcommand's own arguments; its parser is gone then, and no part of a daemon's memory."""
+    summary = COMMANDS[command][1]
+    parser = argparse.ArgumentParser(
+        prog=f"posed {command}",
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        formatter_class=_HelpFormatter,
+        allow_abbrev=False,
+    )
+    module.add_arguments(parser)
+    return parser.parse_args(arguments)
 
 
 def _parser() -> argparse.ArgumentParser:

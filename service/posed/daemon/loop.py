@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import gc
 import logging
 import os
 import signal
@@ -103,6 +104,7 @@ class _Daemon:
             self._waiter.watch(signal_fd)
             wait_for_bind_ns = self._clock.now_ns() + _FIRST_BIND_WAIT_NS
             # Reading a recording leaves up to 6 MB behind that glibc keeps for later; this daemon needs none later.
+            gc.collect()
             ctypes.CDLL(None).malloc_trim(0)
             sd_notify("READY=1")
             _log.info("ready: %s", ", ".join(sensor.name for sensor in self._source.sensors))

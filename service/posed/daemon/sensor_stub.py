@@ -16,7 +16,6 @@ from posed.events import SensorType
 from posed.fusion.kernel import kernel
 from posed.proto import binder_pb2, events_pb2, sensors_pb2
 from posed.sensors import SensorService
-from posed.sensors.dump import Traffic, dump
 
 # Characters of a dump in one reply: of UTF-8's four bytes each, still below 64 KiB.
 _DUMP_PART = 16_000
@@ -136,6 +135,8 @@ class SensorServiceStub(Stub):
         return binder_pb2.Empty()
 
     def dump(self, request: sensors_pb2.DumpRequest, caller: Caller) -> sensors_pb2.DumpReply:
+        from posed.sensors.dump import Traffic, dump  # memory that few daemons ever need
+
         peer = caller.peer
         if request.offset == 0:
             self._watch(peer)
