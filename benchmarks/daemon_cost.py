@@ -61,6 +61,7 @@ def _cost(recording: Path, seconds: float, repeats: int) -> list[Figure]:
 
     with (
         PrivateDaemon([f"--source=replay:{recording}", "--loop"]) as replay,
+        PrivateDaemon([f"--source=replay:{recording}", "--loop", "--filter=dcm"]) as plain,
         PrivateDaemon(["--source=sim"]) as simulated,
     ):
         for repeat in range(repeats):
@@ -68,6 +69,7 @@ def _cost(recording: Path, seconds: float, repeats: int) -> list[Figure]:
             for name, seen in zip(("replay idle", "idle"), observe([replay, simulated], seconds), strict=True):
                 runs.setdefault(name, []).append(seen)
             run("replay pose", replay, Workload.poses(replay, SENSOR_DELAY_FASTEST))
+            run("dcm", plain, Workload.poses(plain, SENSOR_DELAY_FASTEST))
             run("pose", simulated, Workload.poses(simulated, SENSOR_DELAY_FASTEST))
             run("streamed", simulated, Workload([_LOAD, "latency"], simulated.environment()))
             run("batched", simulated, Workload.events(simulated, SENSOR_DELAY_FASTEST, BATCH_LATENCY_US))
@@ -91,12 +93,14 @@ def _cost(recording: Path, seconds: float, repeats: int) -> list[Figure]:
     def of(run: str, what: Callable[[Observation], float]) -> list[float]:
         return [what(one) for one in runs[run]]
 
+    filters = [ours / plain for ours, plain in zip(cpu("replay pose"), cpu("dcm"), strict=True)]
     simulation = [more - less for more, less in zip(cpu("pose"), cpu("replay pose"), strict=True)]
     served = [result["fewest"] / result["seconds"] for result in results["many"]]
     return [
         figure("idle, nobody bound", cpu("idle"), at_most=0.05),
         figure("FASTEST, one pose client, replay", cpu("replay pose"), at_most=0.8),
         figure("- idle subtracted", cpu("replay pose", "replay idle")),
+        figure("- times the same with the filter dcm", filters, "", at_most=1.15),
         figure("- of which filter", of("replay pose", lambda one: one.filter_cpu_percent)),
         figure("- of which source", of("replay pose", lambda one: one.source_cpu_percent)),
         figure("- wake-ups", of("replay pose", lambda one: one.daemon.wakeups_per_s), "1/s", at_most=35),
