@@ -35,19 +35,48 @@ def test_what_one_daemon_knew_is_forgotten_with_the_next(page: Page) -> None:
             const { Scene } = await import("/page/scene.js");
             const scene = new Scene();
             const place = { latitude: 40, longitude: 22, height: 60, source: "gnss", wmm_declination_deg: 5 };
-            scene.takeLink({ state: "CONNECTED", reason: "" });
+            scene.takeLink({ state: "CONNECTED", reason: "", n: 1 });
             scene.takeTruth({ t: 0, q: [0, 0, 0, 1], d: 4, e: [100, 0, 0] });
             scene.takeObserver(place);
             const before = [scene.declination.source, scene.start.longitude < 22];
-            scene.takeLink({ state: "DISCONNECTED", reason: "" });
+            scene.takeLink({ state: "DISCONNECTED", reason: "", n: 1 });
             const meanwhile = scene.truth !== null;
-            scene.takeLink({ state: "CONNECTED", reason: "" });
-            const after = [scene.declination.source, scene.start.longitude === 22];
-            scene.takeObserver(null);
-            return [before, meanwhile, after, scene.start, scene.knownPosition, scene.declination.source];
+            scene.takeLink({ state: "CONNECTED", reason: "", n: 2 });
+            const after = [scene.declination.source, scene.start, scene.knownPosition];
+            scene.takeObserver({ ...place, longitude: 30 });
+            const isAt30 = () => Math.abs(scene.start.longitude - 30) < 1e-9;
+            const anew = isAt30();
+            // A tab that slept through the loss is told of the new connection alone.
+            scene.takeLink({ state: "CONNECTED", reason: "", n: 2 });
+            const same = isAt30();
+            scene.takeLink({ state: "CONNECTED", reason: "", n: 3 });
+            return { before, meanwhile, after, anew, same, slept: scene.start };
         }"""
     )
-    assert found == [["truth", True], True, ["WMM 2025", True], None, None, "unknown"]
+    assert found == {
+        "before": ["truth", True],
+        "meanwhile": True,
+        "after": ["unknown", None, None],
+        "anew": True,
+        "same": True,
+        "slept": None,
+    }
+
+
+def test_of_one_frame_the_link_is_taken_before_what_came_over_it(page: Page) -> None:
+    taken = page.evaluate(
+        """async () => {
+            const { Live } = await import("/web/live.js");
+            const taken = [];
+            const take = (key) => (value) => taken.push([key, value]);
+            const live = new Live("/live", { on: { s: take("s"), o: take("o") } });
+            live._take({ o: 1, p: "of no interest", s: 2 });
+            live._socket.onclose = null;
+            live._socket.close();
+            return taken;
+        }"""
+    )
+    assert taken[:2] == [["s", 2], ["o", 1]]
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ def test_there_is_an_end_to_them(store: CorrectionStore, tmp_path: Path) -> None
     assert full.load()["7"]["heading_offset_deg"] == 1
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{}", '{"corrections": []}', "{", "\x80"])
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"corrections": []}', "{", "\x80", "[" * 100_000])
 def test_a_file_of_somebody_elses_is_neither_used_nor_overwritten(tmp_path: Path, content: str) -> None:
     path = tmp_path / "corrections.json"
     path.write_bytes(content.encode("latin-1"))

@@ -88,6 +88,30 @@ def test_a_daemon_that_knows_no_position_takes_the_one_before_back() -> None:
     assert [observer and observer["latitude"] for observer in observers] == [40.6265, None]
 
 
+def test_with_each_connection_the_observer_is_taken_back_and_told_anew() -> None:
+    told: list[tuple[str, Any]] = []
+    feed = ServiceFeed("GAME", auto_create=False)
+    feed._publish = lambda key, value: told.append((key, value))
+    here = Position(40.6265, 22.9591, 72.5, (0.0,) * 9, (0.0, 0.0, 0.0), "stated", None)
+    pose = Pose(
+        Delivery(bytes(16), 1, 0, 0, 1.0), 0, (0, 0, 0, 1), (0, 0, 0), 0.1, "dcm", PoseStatus(0), "GAME", 1, here
+    )
+    for _ in range(2):
+        feed._connected()
+        feed._take_pose(pose)
+    observers = [value for key, value in told if key == "o"]
+    # The count sets equal places apart, lest the second be taken for the first and not sent.
+    assert [observer and observer["n"] for observer in observers] == [None, 1, None, 2]
+    assert [value["n"] for key, value in told if key == "s"] == [1, 2]
+
+
+def test_the_age_of_a_predicted_pose_counts_from_the_instant_it_was_predicted_for() -> None:
+    delivery = Delivery(bytes(16), 1, 10**9, 5 * 10**6, 1.0)
+    pose = Pose(delivery, 10**9, (0, 0, 0, 1), (0, 0, 0), 0.1, "dcm", PoseStatus(0), "GAME", 1, None)
+    ahead = dataclasses.replace(pose, predicted_ns=20 * 10**6)
+    assert pose_message(ahead)["t"] - pose_message(pose)["t"] == 20
+
+
 def test_the_declination_is_that_of_the_world_magnetic_model() -> None:
     # The simulated phone's field is the model's at Thessaloniki, written down on its own.
     here = wmm_declination_deg(40.6265, 22.9591, datetime.date(2025, 1, 1))

@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from served import Served, SilentFeed
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from posed.ar.app import ArContent
+from posed.ar.app import ArContent, _Ar
 from posed.ar.corrections import CorrectionStore
 from posed.web.live import Handover, Outbox
 
@@ -154,7 +154,10 @@ def test_a_page_learns_the_servers_clock(served: Served) -> None:
 
 @pytest.mark.parametrize(
     "request_text",
-    ["no JSON", "[1]", '{"m": "TURBO"}', json.dumps({"m": "x" * 2500}), "[" * 1900, json.dumps({"m": "é" * 90}), b"{}"],
+    [
+        *("no JSON", "[1]", '{"m": "TURBO"}', json.dumps({"m": "x" * 2500}), "[" * 1900, json.dumps({"m": "é" * 90})),
+        *('{"c": [1]}', '{"t": {}}', b"{}"),
+    ],
     ids=lambda text: str(text[:12]),
 )
 def test_a_request_that_makes_no_sense_ends_that_page_only(
@@ -169,6 +172,44 @@ def test_a_request_that_makes_no_sense_ends_that_page_only(
         assert closed.value.rcvd.code == 1007
         feed.publish("p", 1)
         assert receive_until(other, "p")["p"] == 1
+
+
+def test_the_feed_is_closed_after_all_that_was_asked_of_it() -> None:
+    class Slow(SilentFeed):
+        """Is asked for more while it does what it was asked for."""
+
+        def __init__(self) -> None:
+            super().__init__()
+            self.asks_more: Callable[[], Any] = lambda: None
+            self.done: list[str] = []
+
+        def set_rate_mode(self, mode: str) -> None:
+            self.asks_more()
+            self.done.append(mode)
+
+        def want_truth(self, wanted: bool) -> None:
+            self.done.append(f"truth {wanted}")
+
+        def close(self) -> None:
+            self.done.append("closed")
+
+    async def serve(feed: Slow, store: CorrectionStore) -> None:
+        ar = _Ar(feed, ArContent({"viewpoint": None, "places": []}, {}), store)
+        loop = asyncio.get_running_loop()
+        closing = asyncio.Event()
+
+        async def wish_late() -> None:
+            await closing.wait()
+            ar._follow_wishes()
+
+        feed.asks_more = lambda: asyncio.run_coroutine_threadsafe(wish_late(), loop).result(20)
+        async with ar._lifespan(ar.app):
+            ar._in_background(feed.set_rate_mode, "GAME")
+            loop.call_soon(closing.set)  # by then the feed is being waited for
+
+    feed = Slow()
+    asyncio.run(serve(feed, CorrectionStore(Path("unused.json"))))
+    assert feed.done == ["GAME", "truth False", "closed"]
 
 
 def receive_until(page: ClientConnection, key: str) -> dict[str, Any]:

@@ -72,7 +72,8 @@ class _Ar:
         try:
             yield
         finally:
-            if self._feeding:
+            # A page that goes meanwhile has a wish more.
+            while self._feeding:
                 await asyncio.wait(set(self._feeding))
             await asyncio.to_thread(self._feed.close)
 

@@ -26,7 +26,7 @@ class CorrectionStore:
                 raise TypeError("corrections is no object")
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise PosedError(f"{self._path} holds no corrections: {error}; move it away to begin anew") from error
         return {name: correction(value) for name, value in found.items()}
 

@@ -41,7 +41,7 @@ class ServiceFeed:
     fused, x poses missed before it.
     t: the truth at a grid instant, against true north: t, q, d declination, e position east, north, up from the start
     (m) or null. o: the observer, null where the daemon knows no position. s: state of the binding, and the reason.
-    v: the phone.
+    v: the phone. In s and o, n counts the connections: what came with another n is another daemon's.
     """
 
     def __init__(self, rate_mode: str, *, auto_create: bool) -> None:
@@ -52,6 +52,7 @@ class ServiceFeed:
         self._poses: PoseClient | None = None
         self._truths: PoseClient | None = None
         self._position: Position | None = None
+        self._connections = 0
 
     def start(self, publish: Publish) -> None:
         self._publish = publish
@@ -84,6 +85,9 @@ class ServiceFeed:
             self._poses.close()
 
     def _connected(self) -> None:
+        self._connections += 1
+        self._position = None
+        self._publish("o", None)
         self._tell_state("CONNECTED", "")
         device = self._poses.device if self._poses is not None else None
         if device is not None:
@@ -92,13 +96,13 @@ class ServiceFeed:
             )
 
     def _tell_state(self, state: str, reason: str) -> None:
-        self._publish("s", {"state": state, "reason": reason})
+        self._publish("s", {"state": state, "reason": reason, "n": self._connections})
 
     def _take_pose(self, pose: Pose) -> None:
         self._publish("p", pose_message(pose))
         if pose.position != self._position:
             self._position = pose.position
-            self._publish("o", pose.position and observer_message(pose.position))
+            self._publish("o", pose.position and {**observer_message(pose.position), "n": self._connections})
 
     def _take_truth(self, truth: Truth) -> None:
         if truth.instant_quaternion is not None:

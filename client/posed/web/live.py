@@ -149,4 +149,7 @@ def _request(text: str | None) -> dict[str, Any]:
         raise ValueError("a request nested too deep") from None
     if not isinstance(request, dict):
         raise ValueError("a request must be a JSON object")
+    # What is nested just deep enough to be read may be too deep to be sent back.
+    if any(isinstance(value, dict | list) for value in request.values()):
+        raise ValueError("a request holds numbers and text, nothing nested")
     return request

@@ -63,6 +63,11 @@ const live = new Live("/live", {
     if (!wasOpen && (await isRefused())) scene.link = { state: "REFUSED", reason: "" };
   },
   on: {
+    // First: with another daemon the rest is another phone's.
+    s: (link) => {
+      scene.takeLink(link);
+      read();
+    },
     p: (pose) => {
       scene.takePose(pose, performance.now());
       isNewPose = true;
@@ -81,10 +86,6 @@ const live = new Live("/live", {
       scene.device = device;
       resize();
       settings.show();
-    },
-    s: (link) => {
-      scene.takeLink(link);
-      read();
     },
   },
 });

@@ -70,17 +70,21 @@ export class Scene {
     return this._frozen !== null;
   }
 
-  /** Take how the way to the daemon stands; one that has just been found may be another phone, somewhere else. */
+  /**
+   * Take how the way to the daemon stands; one that has just been found may be another phone, somewhere else.
+   *
+   * A tab that slept has not seen that the one before was lost: the count of connections tells.
+   */
   takeLink(link) {
-    if (link.state === "CONNECTED" && this.link.state !== "CONNECTED") this._forgetTruth();
+    const isNew = this.link.state !== "CONNECTED" || link.n !== this.link.n;
+    if (link.state === "CONNECTED" && isNew) this._forget();
     this.link = link;
   }
 
-  _forgetTruth() {
+  _forget() {
     this.truth = null;
     this._previousTruth = null;
-    this._start = null;
-    if (this.observer !== null) this.takeObserver(this.observer);
+    this.takeObserver(null);
   }
 
   /** @param {?Object} place  null where the daemon knows no position */

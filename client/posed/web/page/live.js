@@ -10,7 +10,7 @@ const CLOCK_KEPT = 8;
 
 /**
  * @typedef {Object} Handlers
- * @property {Object<string, function(any): void>} on  by key of the frame: takes the key's value
+ * @property {Object<string, function(any): void>} on  by key of the frame: takes the key's value; called in this order
  * @property {function(): void} [opened]
  * @property {function(boolean): void} [closed]  told whether this socket had ever been open
  */
@@ -74,9 +74,9 @@ export class Live {
   _take(frame) {
     const at = performance.now();
     if (frame.i !== undefined) this.send({ a: frame.i });
-    for (const key in frame) {
-      if (key === "c") this._takeClock(frame.c, at);
-      else this._handlers.on[key]?.(frame[key]);
+    if ("c" in frame) this._takeClock(frame.c, at);
+    for (const key in this._handlers.on) {
+      if (key in frame) this._handlers.on[key](frame[key]);
     }
   }
 
