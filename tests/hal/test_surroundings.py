@@ -94,7 +94,7 @@ def test_how_often_it_is_drained_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("kind", "value", "said"),
     [
-        (LIGHT, -1.0, "light = -1 is more than its sensor reads; allowed: 0 to 10000"),
+        (LIGHT, -1.0, "light = -1 is not what its sensor can read; allowed: 0 to 10000"),
         (PROXIMITY, 6.0, "proximity = 6 .*allowed: 0 to 5"),
         (PRESSURE, float("nan"), "pressure = nan"),
         (SensorType.GYROSCOPE, 1.0, "gyroscope cannot be set here; this phone lets one set"),

@@ -1,22 +1,24 @@
 """The sensors that the service computes, on the simulated phone, against how it was really moved."""
 
+import itertools
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from posed.clock import VirtualClock
 from posed.errors import InvalidArgumentError
-from posed.events import EventColumn, Position, ReportingMode, SensorType
+from posed.events import EventColumn, FilterStatus, Orientation, Position, ReportingMode, SensorType
 from posed.hal import open_source
 from posed.hal.profile import load_profile
 from posed.sensors import Client, SensorService, device_errors, make_device_filter
 from posed.sensors.connection import SensorEventConnection
 from posed.sensors.declination import declination_at
 from posed.sensors.detectors import DeviceOrientation, Persistence, SignificantMotion, Tilt
-from posed.sensors.fused_events import orientation_angles
-from posed.sensors.steps import StepFinder
+from posed.sensors.fused_events import heading, orientation_angles
+from posed.sensors.steps import Gait, StepFinder
 from posed.sensors.virtual import ACTIVITY_RECOGNITION
 
 _DECLINATION = math.radians(5.5)
@@ -284,26 +286,118 @@ def test_the_device_orientation_is_told_at_first_and_at_each_steady_change() -> 
     assert [value for _, value in _held(DeviceOrientation(), (3, (0.0, 0.0, 9.81)))] == [0]
 
 
+def test_a_tilt_is_of_two_seconds_whatever_the_rate_was_before() -> None:
+    tilt, at_ns, told = Tilt(), 0, []
+    for rate_hz, seconds, degrees in ((400, 5, 0), (50, 3, 0), (50, 10, 40)):
+        for _ in range(rate_hz * seconds):
+            at_ns += round(1e9 / rate_hz)
+            if tilt(at_ns, _raised(degrees)) is not None:
+                told.append(at_ns / 1e9)
+    assert len(told) == 1
+    assert 8 < told[0] <= 10.1
+
+
 def test_persistence_begins_anew_when_it_is_broken() -> None:
     still, moved = (0.0, 0.0, 9.81), (1.5, 0.0, 9.81)
     assert _held(Persistence(moving=False, seconds=5), (4, still), (0.2, moved), (4, still)) == []
     assert _held(SignificantMotion(), (30, still)) == []
 
 
-def test_peaks_at_the_intervals_of_no_walker_are_no_steps() -> None:
-    def steps(interval_s: Sequence[float]) -> int:
-        finder, found, at_s = StepFinder(), 0, 0.0
-        for length in interval_s:
-            for k in range(round(length * 100)):
-                size = 9.81 + 3.0 * math.sin(2 * math.pi * k / round(length * 100))
-                found += len(finder.take(round(1e9 * (at_s + 0.01 * k)), size))
-            at_s += length
-        return found
+def _steps_of(intervals_s: Sequence[float]) -> int:
+    """Return how many of the peaks at these intervals are steps."""
+    gait = Gait()
+    instants_s = itertools.accumulate(intervals_s, initial=1.0)
+    return sum(len(gait.take(round(1e9 * at_s))) for at_s in instants_s)
 
-    assert steps([0.55] * 20) in (18, 19, 20)
-    assert steps([0.4, 0.8] * 10) == 0
-    assert steps([1.2] * 12) == 0
-    assert steps([0.55] * 3) == 0
+
+@pytest.mark.parametrize(
+    ("intervals_s", "steps"),
+    [
+        ([0.55] * 20, 21),
+        ([0.43, 0.65] * 10, 21),  # the legs of one with the phone in a pocket
+        ([0.43, 0.15, 0.5] * 10, 21),  # a second peak at every other step
+        ([0.55] * 6 + [1.1] + [0.55] * 6, 14),  # a step that was not seen
+        ([0.55] * 6 + [2.0] + [0.55] * 6, 14),  # a stop
+        ([0.55] * 6 + [2.0, 0.55, 0.55], 7),
+        ([0.4, 0.8] * 10, 0),
+        ([0.4, 0.85, 0.6] * 5, 0),
+        ([1.2] * 12, 0),
+        ([0.32] * 12, 0),
+        ([0.55] * 2, 0),
+    ],
+)
+def test_peaks_at_a_walkers_intervals_alone_are_steps(intervals_s: list[float], steps: int) -> None:
+    assert _steps_of(intervals_s) == steps
+
+
+def test_the_first_steps_of_a_usual_walk_are_told_within_two_seconds() -> None:
+    gait, told = Gait(), []
+    for step in range(10):
+        told += [(0.55 * step, at_ns / 1e9) for at_ns in gait.take(round(550_000_000 * step))]
+    assert [at_s for _, at_s in told] == pytest.approx([0.55 * step for step in range(10)])
+    assert max(told_s - at_s for told_s, at_s in told) < 2.0
+
+
+@pytest.mark.parametrize("bad", ["nan", "inf", "1e200"])
+def test_what_is_no_measurement_stops_no_detector(tmp_path: Path, bad: str) -> None:
+    rows = ["sensor,timestamp_ns,x,y,z"]
+    for k in range(2000):
+        bounce = bad if k % 400 == 399 else f"{9.81 + 3 * math.sin(2 * math.pi * k / 55):.6f}"
+        rows += [f"accelerometer,{10_000_000 * k},0,{bounce},0", f"gyroscope,{10_000_000 * k},0,0,0"]
+        rows += [f"magnetic_field,{10_000_000 * k},0,-40,-20"]
+    (tmp_path / "walk.csv").write_text("\n".join(rows) + "\n")
+    profile, clock = load_profile("modern"), VirtualClock(10_000_000_000)
+    source = open_source(f"replay:{tmp_path}/walk.csv", profile, clock)
+    service = SensorService(source, make_device_filter("dcm-adaptive", profile), clock, errors=device_errors(profile))
+    connection = service.connect(_WALKER)
+    kinds = (
+        SensorType.STEP_COUNTER,
+        SensorType.TILT_DETECTOR,
+        SensorType.DEVICE_ORIENTATION,
+        SensorType.STATIONARY_DETECT,
+        SensorType.MOTION_DETECT,
+        SensorType.SIGNIFICANT_MOTION,
+    )
+    for kind in kinds:
+        service.enable(connection, int(kind), 0, 0)
+    events = taken(service, connection, clock, 21)
+    assert events[SensorType.STEP_COUNTER].values[-1, 0] == pytest.approx(36, abs=2)
+    assert events[SensorType.DEVICE_ORIENTATION].values.tolist() == [[0.0]]
+    assert {SensorType.MOTION_DETECT, SensorType.SIGNIFICANT_MOTION} <= set(events)
+    assert not {SensorType.TILT_DETECTOR, SensorType.STATIONARY_DETECT} & set(events)
+
+
+def test_an_azimuth_stays_below_360_in_single_precision() -> None:
+    for turned in (0.0, 1e-18, 1e-9, 5e-8, 1e-6, -1e-9):
+        quaternion = (0.0, 0.0, turned, math.sqrt(1 - turned * turned))
+        told = orientation_angles(quaternion)[0], heading(_orientation(quaternion), 0.0)[0]
+        assert all(0 <= float(np.float32(azimuth)) < 360 for azimuth in told)
+        assert all(min(azimuth, 360 - azimuth) < 2e-4 for azimuth in told)
+
+
+def _orientation(quaternion: tuple[float, float, float, float]) -> Orientation:
+    return Orientation(0, quaternion, (0.0, 0.0, 0.0), 0.1, FilterStatus.OK)
+
+
+_WALKS = {
+    "InHand": 365,
+    "FrontPocket": 277,
+    "BackPocket": 314,
+    "Purse": 288,
+    "NeckPouch": 282,
+    "Armband": 295,
+}
+"""Steps that were counted in the walks of one of the Oxford step counter set, by where the phone was."""
+
+
+@pytest.mark.parametrize("place", _WALKS)
+def test_the_steps_of_real_walks_are_found_wherever_the_phone_is(data_dir: Path, place: str) -> None:
+    path = data_dir / "step-counting" / f"Samsung_Carmelo_Hard_{place}_1" / "accelerometer.csv.gz"
+    samples = np.loadtxt(path, delimiter=",", usecols=(0, 2, 3, 4), comments="#")
+    finder = StepFinder()
+    sizes = np.linalg.norm(samples[:, 1:], axis=1).tolist()
+    found = sum(len(finder.take(int(at_ns), size)) for at_ns, size in zip(samples[:, 0], sizes, strict=True))
+    assert found == pytest.approx(_WALKS[place], rel=0.02)
 
 
 def test_true_north_is_known_where_the_position_is() -> None:

@@ -50,6 +50,8 @@ class Fault(Enum):
     STALLS_BY_MOVING = auto()
     TALKS_AFTER_UNREGISTERING = auto()
     CANCELS_TWICE = auto()
+    TELLS_NO_VALUE = auto()
+    FORGETS_JOINERS = auto()
 
 
 def a_sensor(kind: int = Sensor.TYPE_ACCELEROMETER, mode: int = Sensor.REPORTING_MODE_CONTINUOUS) -> Sensor:
@@ -143,7 +145,9 @@ class FaultySource:
         if self._fault is Fault.STALE_EVENTS and self._last_event is not None:
             stale = self._last_event
             self._clock.at(self._clock.now_ns(), lambda: self._hand(made, [stale]))
-        if sensor.handle not in self._running:
+        if sensor.reporting_mode == Sensor.REPORTING_MODE_ON_CHANGE:
+            self._tell_value(made)
+        elif sensor.handle not in self._running:
             self._running.add(sensor.handle)
             self._sample_later(sensor)
         if max_report_latency_us:
@@ -189,6 +193,13 @@ class FaultySource:
         for listener, sensor in self._triggers:
             listener.on_trigger(TriggerEvent(sensor, self._clock.now_ns(), (1.0,)))
         self._triggers.clear()
+
+    def _tell_value(self, made: _Registration) -> None:
+        begun_ns = [r.begun_ns for r in self._registrations if r.sensor == made.sensor]
+        forgotten = self._fault is Fault.FORGETS_JOINERS and len(begun_ns) > 1
+        if not forgotten and self._fault is not Fault.TELLS_NO_VALUE:
+            event = SensorEvent(made.sensor, begun_ns[0], (300.0,), 3)
+            self._clock.at(self._clock.now_ns(), lambda: self._hand(made, [event]))
 
     def _sample_later(self, sensor: Sensor) -> None:
         own = [r for r in self._registrations if r.sensor == sensor]

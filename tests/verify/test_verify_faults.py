@@ -98,10 +98,24 @@ def test_a_one_shot_sensor_is_waited_for_once(fault: Fault, failed: set[str]) ->
     assert _failed(findings) == failed
 
 
+@pytest.mark.parametrize(
+    ("fault", "failed"),
+    [(Fault.NONE, set()), (Fault.TELLS_NO_VALUE, {"OnChange"}), (Fault.FORGETS_JOINERS, {"OnChange"})],
+)
+def test_the_value_of_an_on_change_sensor_is_told_to_all_who_register(fault: Fault, failed: set[str]) -> None:
+    clock = VirtualClock()
+    sensor = a_sensor(Sensor.TYPE_LIGHT, Sensor.REPORTING_MODE_ON_CHANGE)
+    findings = [f for step in steps(FaultySource(clock, fault, (sensor,)), clock, [sensor]) for f in step.run()]
+    assert {f.verification for f in findings} == {"SensorList", "RegisterTwice", "Trigger", "Flush", "OnChange"}
+    assert _failed(findings) == failed
+
+
 def test_every_fault_is_tried() -> None:
     elsewhere = {
         Fault.NONE,
         Fault.CANCELS_TWICE,
+        Fault.TELLS_NO_VALUE,
+        Fault.FORGETS_JOINERS,
         Fault.MISCALIBRATED,
         Fault.FIVE_TIMES_TOO_FAST,
         Fault.SETTLES,

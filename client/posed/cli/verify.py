@@ -127,7 +127,7 @@ def _profile_of_daemon() -> str | None:
 
 
 def _rate_table(name: str | None) -> "Callable[[Sensor], tuple[float, ...]]":
-    """Return the rates of a sensor by the profile; a fused sensor has those of the accelerometer."""
+    """Return the rates of a sensor by the profile, ambient ones too; a fused sensor has those of the accelerometer."""
     from posed.errors import PosedError
     from posed.events import SensorType
     from posed.hal.profile import load_profile
@@ -139,9 +139,9 @@ def _rate_table(name: str | None) -> "Callable[[Sensor], tuple[float, ...]]":
     except PosedError as error:
         print(f"posed: {error}; no profile's rates bind: give one with --profile", file=sys.stderr)
         return lambda sensor: ()
-    parts = {info.handle for info in profile.sensor_infos()}
-    accelerometer = int(SensorType.ACCELEROMETER)
-    return lambda sensor: profile.sensor(sensor.handle if sensor.handle in parts else accelerometer).rates_hz
+    rates_hz = {info.handle: profile.sensor(info.handle).rates_hz for info in profile.sensor_infos()}
+    rates_hz.update({int(part.type): part.rates_hz for part in profile.ambient})
+    return lambda sensor: rates_hz.get(sensor.handle, rates_hz[int(SensorType.ACCELEROMETER)])
 
 
 @contextlib.contextmanager

@@ -35,6 +35,8 @@ class Behaviour:
         if self._sensor.reporting_mode == Sensor.REPORTING_MODE_ONE_SHOT:
             return {"OneShot": self.one_shot}
         always = {"RegisterTwice": self.register_twice, "Trigger": self.trigger, "Flush": self.flush}
+        if self._sensor.reporting_mode == Sensor.REPORTING_MODE_ON_CHANGE:
+            return {**always, "OnChange": self.on_change}
         if self._sensor.reporting_mode != Sensor.REPORTING_MODE_CONTINUOUS:
             return always
         return {
@@ -77,6 +79,27 @@ class Behaviour:
             f"listen {listened}, request {begun}, cancel {first} then {second}, fired {fired}",
             "listen False, request True, cancel True then False, or fired once",
             not listened and begun and not second and fired + first == 1,
+        )
+
+    def on_change(self) -> Iterator[Finding]:
+        """Who registers first is told the value, and who joins the same one (SensorService::enable)."""
+        first, joiner = self._listener(), self._listener()
+        self._register(first, 0)
+        told = self._clock.wait(_EVENT_S, lambda: len(first.received) > 0)
+        self._register(joiner, 0)
+
+        def is_told_the_same() -> bool:
+            known = {each.event.timestamp for each in first.received}
+            return bool(joiner.received) and joiner.received[0].event.timestamp in known
+
+        same = self._clock.wait(_EVENT_S, is_told_the_same)
+        self._source.unregister_listener(first)
+        self._source.unregister_listener(joiner)
+        yield self._judged(
+            "OnChange",
+            f"{'a' if told else 'no'} value, {'the same' if same else 'not the same'} to who joined",
+            f"a value in {_EVENT_S:g} s, the same to who joined",
+            told and same,
         )
 
     def flush(self) -> Iterator[Finding]:

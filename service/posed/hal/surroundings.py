@@ -55,7 +55,7 @@ class Surroundings:
             raise InvalidArgumentError(f"{kind.name.lower()} cannot be set here; this phone lets one set {known}")
         if not 0.0 <= value <= part.max_range:
             raise InvalidArgumentError(
-                f"{kind.name.lower()} = {value:g} is more than its sensor reads; allowed: 0 to {part.max_range:g}"
+                f"{kind.name.lower()} = {value:g} is not what its sensor can read; allowed: 0 to {part.max_range:g}"
             )
         self._values[int(kind)].set(value, at_ns)
         active = self._active.get(int(kind))

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from posed.events import EventColumn, FlatEvent, SensorType
 from posed.sensors.virtual import Computation
 
 _HIGH_ACCURACY = 3
+_LARGEST = 10_000.0
+"""m/s2. A sample beyond it, or with NaN, is no measurement, for the filters neither."""
 _Vector = tuple[float, float, float]
 
 
@@ -25,6 +27,13 @@ def event_column(found: Sequence[tuple[int, float]]) -> EventColumn | None:
     timestamps, values = zip(*found, strict=True)
     accuracy = np.full(len(found), _HIGH_ACCURACY, np.int8)
     return EventColumn(np.array(timestamps, np.int64), np.array(values, np.float64)[:, np.newaxis], accuracy)
+
+
+def accelerations(events: Sequence[FlatEvent]) -> Iterator[tuple[int, _Vector]]:
+    """Yield timestamp and value of each accelerometer event that is a measurement: a recording holds others too."""
+    for kind, timestamp_ns, x, y, z in events:
+        if kind == SensorType.ACCELEROMETER and math.hypot(x, y, z) <= _LARGEST:
+            yield timestamp_ns, (x, y, z)
 
 
 class Detector:
@@ -43,8 +52,8 @@ class Detector:
         return event_column(
             [
                 (timestamp_ns, value)
-                for kind, timestamp_ns, x, y, z in events
-                if kind == SensorType.ACCELEROMETER and (value := self._rule(timestamp_ns, (x, y, z))) is not None
+                for timestamp_ns, acceleration in accelerations(events)
+                if (value := self._rule(timestamp_ns, acceleration)) is not None
             ]
         )
 
@@ -75,9 +84,11 @@ class Tilt:
         turned = _cosine(self._sum, self._reference) < self._COSINE
         if turned:
             self._reference = list(self._sum)
-        _, oldest = self._window.popleft()
-        for axis in range(3):
-            self._sum[axis] -= oldest[axis]
+        # More than one goes after a change to a slower rate, or a gap.
+        while timestamp_ns - self._window[0][0] >= self._WINDOW_NS:
+            _, oldest = self._window.popleft()
+            for axis in range(3):
+                self._sum[axis] -= oldest[axis]
         return 1.0 if turned else None
 
 

@@ -10,6 +10,8 @@ from posed.events import STANDARD_GRAVITY, EventColumn, Orientation, SensorType
 _Vector = tuple[float, float, float]
 _Row = tuple[float, ...]
 _HIGH_ACCURACY = 3
+_FULL_TURN = 360.0 - 2.0**-16
+"""Degrees that the single precision of an event's values shows as 360."""
 
 
 class FusedEvents:
@@ -81,7 +83,7 @@ def orientation_angles(quaternion: tuple[float, float, float, float]) -> _Vector
     x, y, z, w = quaternion
     east_x, north_x = 1 - 2 * (y * y + z * z), 2 * (x * y + w * z)
     up_x, up_y, up_z = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
-    azimuth = math.degrees(math.atan2(-north_x, east_x)) % 360.0
+    azimuth = _from_north(math.atan2(-north_x, east_x))
     return azimuth, math.degrees(math.atan2(-up_y, up_z)), math.degrees(math.asin(max(-1.0, min(1.0, up_x))))
 
 
@@ -89,7 +91,13 @@ def heading(orientation: Orientation, declination: float) -> _Row:
     """Return where the device's y axis points from true north, 0 to 360 degrees, and its accuracy (68 %), degrees."""
     x, y, z, w = orientation.quaternion
     azimuth = math.atan2(2 * (x * y - w * z), 1 - 2 * (x * x + z * z))
-    return math.degrees(azimuth + declination) % 360.0, math.degrees(orientation.heading_accuracy)
+    return _from_north(azimuth + declination), math.degrees(orientation.heading_accuracy)
+
+
+def _from_north(angle: float) -> float:
+    """Return an angle (rad) in degrees, 0 or more and below 360."""
+    degrees = math.degrees(angle) % 360.0
+    return degrees if degrees < _FULL_TURN else 0.0
 
 
 def _linear_acceleration(orientation: Orientation, acceleration: _Vector) -> _Row:
