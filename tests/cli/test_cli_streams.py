@@ -150,7 +150,7 @@ def test_what_is_set_is_told(shell: Shell) -> None:
     assert json.loads(stream.stdout.readline())["values"] == [12]
     refused = shell.run("set", "light", "1e9")
     assert (refused.returncode, refused.stderr.count("\n")) == (1, 1)
-    assert "light = 1e+09 is more than its sensor reads; allowed: 0 to 10000" in refused.stderr
+    assert "light = 1e+09 is not what its sensor can read; allowed: 0 to 10000" in refused.stderr
     assert shell.run("set", "gyroscope", "1").returncode == 2
 
 
