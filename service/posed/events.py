@@ -157,6 +157,12 @@ class EventColumn:
         return EventColumn(self.timestamp_ns[rows], self.values[rows], self.accuracy[rows])
 
     @staticmethod
+    def of_rows(timestamps: "Sequence[int]", rows: "Sequence[Sequence[float]]") -> "EventColumn":
+        """Make a column, at least one row, of high accuracy (Android's SENSOR_STATUS_ACCURACY_HIGH)."""
+        accuracy = np.full(len(timestamps), 3, np.int8)
+        return EventColumn(np.array(timestamps, np.int64), np.array(rows, np.float64), accuracy)
+
+    @staticmethod
     def concatenate(parts: "Sequence[EventColumn]") -> "EventColumn":
         """Join columns of one sensor, given in time order."""
         if len(parts) == 1:

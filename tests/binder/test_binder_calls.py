@@ -147,7 +147,8 @@ def test_call_too_large_is_not_sent(server: ServerThread, connection: Connection
 
 
 def test_largest_call_passes(connection: Connection) -> None:
-    connection.proxy(SENSORS, "sensorservice").flush(sensors_pb2.FlushRequest(listener="l" * (MAX_PARCEL_BYTES - 100)))
+    request = sensors_pb2.FlushRequest(listener="l" * (MAX_PARCEL_BYTES - 100))
+    assert connection.proxy(SENSORS, "sensorservice").flush(request) == EMPTY
 
 
 def test_reply_too_large_is_an_exception(server: ServerThread, connection: Connection) -> None:

@@ -86,12 +86,12 @@ class SensorProfile:
     @property
     def min_delay_us(self) -> int:
         """The period of the fastest rate in whole microseconds, rounded down."""
-        return exact_period_ns(self.rates_hz[-1]).until(1) // 1000
+        return _min_delay_us(self.rates_hz)
 
     @property
     def max_delay_us(self) -> int:
         """The period of the slowest rate in whole microseconds, rounded up: truncated, 15 Hz would turn into 50."""
-        return -(-exact_period_ns(self.rates_hz[0]).rounded_up() // 1000)
+        return _max_delay_us(self.rates_hz)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +138,8 @@ class AmbientPart:
             max_range=self.max_range,
             resolution=self.resolution,
             power_ma=self.power_ma,
-            min_delay_us=exact_period_ns(self.rates_hz[-1]).until(1) // 1000 if self.rates_hz else 0,
-            max_delay_us=-(-exact_period_ns(self.rates_hz[0]).rounded_up() // 1000) if self.rates_hz else 0,
+            min_delay_us=_min_delay_us(self.rates_hz) if self.rates_hz else 0,
+            max_delay_us=_max_delay_us(self.rates_hz) if self.rates_hz else 0,
             reporting_mode=self.mode,
             wake_up=self.type is SensorType.PROXIMITY,
         )
@@ -246,6 +246,14 @@ def _configured_rate_hz(rates_hz: tuple[float, ...], sampling_period_ns: int) ->
         if exact_period_ns(rate).samples_in(sampling_period_ns) >= 1:
             return rate
     return rates_hz[-1]
+
+
+def _min_delay_us(rates_hz: tuple[float, ...]) -> int:
+    return exact_period_ns(rates_hz[-1]).until(1) // 1000
+
+
+def _max_delay_us(rates_hz: tuple[float, ...]) -> int:
+    return -(-exact_period_ns(rates_hz[0]).rounded_up() // 1000)
 
 
 def profile_names() -> tuple[str, ...]:

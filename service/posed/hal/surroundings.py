@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from posed.errors import InvalidArgumentError
 from posed.events import EventColumn, ReportingMode, SensorInfo, SensorType
 from posed.hal.profile import AmbientPart, exact_period_ns
@@ -11,7 +9,6 @@ from posed.hal.seeded import SeededRandom
 
 _AT_FIRST = {SensorType.PRESSURE: 1013.25, SensorType.LIGHT: 300.0}
 """hPa, lux; nothing is near (cm), as far as a proximity sensor sees."""
-_HIGH_ACCURACY = 3
 _NOISE_STREAM = 3
 """Sets the generators of ambient noise apart from the others made from the same seed."""
 
@@ -143,14 +140,14 @@ class _Sampled:
 
     def take(self, until_ns: int) -> EventColumn | None:
         stamps: list[int] = []
-        readings: list[float] = []
+        readings: list[list[float]] = []
         while self.next_ns <= until_ns:
             noise = SeededRandom(*self._key, self._sample).normal((1,))[0] if self._std else 0.0
             stamps.append(self.next_ns)
-            readings.append(self._digitised(self._value.at(self.next_ns) + self._std * float(noise)))
+            readings.append([self._digitised(self._value.at(self.next_ns) + self._std * float(noise))])
             self._sample += 1
             self.next_ns = self._period.until(self._sample)
-        return _column(stamps, readings)
+        return EventColumn.of_rows(stamps, readings) if stamps else None
 
     def _digitised(self, reading: float) -> float:
         step = self._part.resolution
@@ -164,6 +161,7 @@ class _Changes:
         self.period_ns = period_ns
         self._told: float | None = None
         self._value = value
+        self._earliest_ns = at_ns
         self.next_ns: int | None = at_ns
 
     def change(self, value: float, at_ns: int) -> None:
@@ -180,16 +178,4 @@ class _Changes:
             return None
         self._told = self._value
         self._earliest_ns = at_ns + self.period_ns
-        return _column([at_ns], [self._value])
-
-    _earliest_ns = 0
-
-
-def _column(stamps: list[int], readings: list[float]) -> EventColumn | None:
-    if not stamps:
-        return None
-    return EventColumn(
-        np.array(stamps, np.int64),
-        np.array(readings, np.float64)[:, np.newaxis],
-        np.full(len(stamps), _HIGH_ACCURACY, np.int8),
-    )
+        return EventColumn.of_rows([at_ns], [[self._value]])

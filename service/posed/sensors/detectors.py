@@ -4,12 +4,9 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 
-import numpy as np
-
 from posed.events import EventColumn, FlatEvent, SensorType
 from posed.sensors.virtual import Computation
 
-_HIGH_ACCURACY = 3
 _LARGEST = 10_000.0
 """m/s2. A sample beyond it, or with NaN, is no measurement, for the filters neither."""
 _Vector = tuple[float, float, float]
@@ -24,9 +21,7 @@ def event_column(found: Sequence[tuple[int, float]]) -> EventColumn | None:
     """Return (timestamp, value) pairs as a sensor's events of one value, None if there are none."""
     if not found:
         return None
-    timestamps, values = zip(*found, strict=True)
-    accuracy = np.full(len(found), _HIGH_ACCURACY, np.int8)
-    return EventColumn(np.array(timestamps, np.int64), np.array(values, np.float64)[:, np.newaxis], accuracy)
+    return EventColumn.of_rows([timestamp_ns for timestamp_ns, _ in found], [[value] for _, value in found])
 
 
 def accelerations(events: Sequence[FlatEvent]) -> Iterator[tuple[int, _Vector]]:

@@ -3,13 +3,10 @@
 import math
 from collections.abc import Callable, Collection
 
-import numpy as np
-
 from posed.events import STANDARD_GRAVITY, EventColumn, Orientation, SensorType
 
 _Vector = tuple[float, float, float]
 _Row = tuple[float, ...]
-_HIGH_ACCURACY = 3
 _FULL_TURN = 360.0 - 2.0**-16
 """Degrees that the single precision of an event's values shows as 360."""
 
@@ -41,9 +38,7 @@ class FusedEvents:
         """Return one column a fused sensor, by handle; none if nothing was added."""
         if not self._timestamps:
             return {}
-        timestamps = np.array(self._timestamps, np.int64)
-        accuracy = np.full(len(timestamps), _HIGH_ACCURACY, np.int8)
-        return {int(kind): EventColumn(timestamps, np.array(rows), accuracy) for kind, rows in self._rows.items()}
+        return {int(kind): EventColumn.of_rows(self._timestamps, rows) for kind, rows in self._rows.items()}
 
 
 class PoseMotion:

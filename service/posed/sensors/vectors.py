@@ -2,14 +2,11 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from posed.events import EventColumn, FlatEvent, SensorType
 from posed.fusion import make_filter
 from posed.fusion.filter import OrientationFilter, SensorErrors
 
 _FILTERS = {SensorType.GAME_ROTATION_VECTOR: "game", SensorType.GEOMAGNETIC_ROTATION_VECTOR: "geomag"}
-_HIGH_ACCURACY = 3
 
 
 class RotationVector:
@@ -41,6 +38,4 @@ class RotationVector:
                 accuracy = (orientation.heading_accuracy,) if self._has_heading else ()
                 rows.append((*orientation.quaternion, *accuracy))
         self._filter.update_batch(events[done:])
-        if not rows:
-            return None
-        return EventColumn(np.array(timestamps, np.int64), np.array(rows), np.full(len(rows), _HIGH_ACCURACY, np.int8))
+        return EventColumn.of_rows(timestamps, rows) if rows else None
