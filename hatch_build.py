@@ -43,8 +43,10 @@ _DIRECTIVES = {
     "cdivision": True,
 }
 # Same bits as the interpreter: nothing reassociated, no product and sum contracted into one rounding, no sin and cos
-# merged into a sincos that might round otherwise.
-_C_FLAGS = ["-O2", "-g0", "-w", "-fno-fast-math", "-ffp-contract=off", "-fno-builtin-sin", "-fno-builtin-cos"]
+# merged into a sincos that might round otherwise. Optimised for size: a daemon that wakes ten times a second finds its
+# code in no cache, and a third of a megabyte less is resident.
+_C_FLAGS = ["-Os", "-g0", "-w", "-fno-fast-math", "-ffp-contract=off", "-fno-builtin-sin", "-fno-builtin-cos"]
+_C_FLAGS += ["-fno-asynchronous-unwind-tables"]
 
 # Each compiled module is mapped into the daemon: nothing in it that is not needed, and no page begun for a few bytes.
 _LINK_FLAGS = ["-Wl,-z,noseparate-code", "-Wl,--gc-sections", "-s"]

@@ -47,6 +47,9 @@ def dealer(context: Context) -> Socket:
     socket = _connected(context, zmq.DEALER, high_water_mark=1000)
     socket.setsockopt(zmq.SNDHWM, 64)
     socket.setsockopt(zmq.LINGER, _FAREWELL_MS)
+    # For a daemon that stops before its first ping, which is what tells of it otherwise.
+    socket.setsockopt(zmq.HEARTBEAT_IVL, 3000)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1000)
     return socket
 
 
@@ -89,6 +92,14 @@ _FAREWELL_MS = 200
 
 def _bound(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket = _socket(context, kind, high_water_mark)
+    # A stopped process answers nothing but keeps its sockets open: a stopped client is seen on the control socket after
+    # 1.0 to 1.9 s, as the ping it leaves unanswered is up to 0.9 s away. On a pose socket it only costs what is sent in
+    # vain, and pings as often would wake the daemon twice a second for each client. A client sees
+    # a stopped daemon once the time to live has passed since its last ping, and need not ping as often itself.
+    control = kind == zmq.ROUTER
+    socket.setsockopt(zmq.HEARTBEAT_IVL, 900 if control else 3000)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1000)
+    socket.setsockopt(zmq.HEARTBEAT_TTL, 1500 if control else 4500)
     # The mode of the directory keeps strangers out; this is the lock behind it.
     socket.setsockopt(zmq.IPC_FILTER_UID, os.getuid())
     # What does not begin as ZMTP 3 passes for ZMTP 1, which has no heartbeat: an HTTP request would keep its connection
@@ -112,13 +123,6 @@ def _socket(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket.setsockopt(zmq.RCVHWM, high_water_mark)
     # By default a frame that claims 1 GiB gets 1 GiB. Parcels end at 64 KiB.
     socket.setsockopt(zmq.MAXMSGSIZE, 128 * 1024)
-    # A stopped process answers nothing but keeps its sockets open: seen on a control socket after 1.2 to 1.9 s, as the
-    # ping it leaves unanswered is up to 0.7 s away. On a pose socket it only costs what is sent in vain, and pings as
-    # often would wake the daemon three times a second for each client.
-    control = kind in (zmq.ROUTER, zmq.DEALER)
-    socket.setsockopt(zmq.HEARTBEAT_IVL, 700 if control else 3000)
-    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1200)
-    socket.setsockopt(zmq.HEARTBEAT_TTL, 1200 if control else 4200)
     # Who connects and says nothing, or not ZMTP, is gone after this long.
     socket.setsockopt(zmq.HANDSHAKE_IVL, 500)
     return socket

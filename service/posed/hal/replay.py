@@ -147,8 +147,9 @@ class ReplaySource:
         flushed, self._flushes = self._flushes, []
         columns: dict[int, EventColumn] = {}
         if self._active and until_ns > self._drained_ns:
+            shift_ns = self._shift_ns(until_ns)
             for handle, stream in self._active.items():
-                column = self._between(stream, max(self._drained_ns, stream.since_ns), until_ns)
+                column = self._between(stream, max(self._drained_ns, stream.since_ns), until_ns, shift_ns)
                 if len(column.timestamp_ns):
                     columns[handle] = column
             self._drained_ns = until_ns
@@ -216,8 +217,9 @@ class ReplaySource:
             return 0
         return max(0, (sample_ns - self._recording.start_ns) // self._pass_ns) * self._pass_ns
 
-    def _between(self, stream: "_Stream", after_ns: int, until_ns: int) -> EventColumn:
-        first_ns, last_ns = self._shift_ns(after_ns), self._shift_ns(until_ns)
+    def _between(self, stream: "_Stream", after_ns: int, until_ns: int, last_ns: int) -> EventColumn:
+        """Return a stream's rows; last_ns: the shift of `until_ns`."""
+        first_ns = self._shift_ns(after_ns)
         if first_ns == last_ns:
             return stream.rows(after_ns, until_ns, first_ns)
         passes = [

@@ -115,20 +115,18 @@ class PoseFusion:
             self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
         started = self._clock.cpu_ns()
         done = 0
-        # Where true north points is worked out only for those who ask.
-        declination = self._declination() if SensorType.HEADING in wanted else 0.0
-        fused = FusedEvents(wanted, declination, self._motion)
-        for instant_ns, row, grid in self._stops(events, until_ns, bool(wanted)):
+        fused = self._fused_events(wanted) if wanted else None
+        for instant_ns, row, grid in self._stops(events, until_ns, fused is not None):
             stop = bisect_right(events, instant_ns, done, key=_time_of)
             self._feed(events[done:stop])
             done = stop
             if grid is not None:
                 self._pass_instant(grid)
-            elif (orientation := self._filter.orientation()) is not None:
+            elif fused is not None and (orientation := self._filter.orientation()) is not None:
                 fused.add(instant_ns, events[row][2:], orientation)
         self._feed(events[done:])
         self.cpu_ns += self._clock.cpu_ns() - started
-        return fused.columns()
+        return fused.columns() if fused is not None else {}
 
     def take_poses(self) -> list[Pose]:
         """Remove and return the poses of the grid instants passed since the last call, oldest first."""
@@ -162,6 +160,11 @@ class PoseFusion:
             stops += [(event[1], row, None) for row, event in enumerate(events) if event[0] == SensorType.ACCELEROMETER]
         stops.sort(key=_instant_of)
         return stops
+
+    def _fused_events(self, wanted: Collection[SensorType]) -> FusedEvents:
+        # Where true north points is worked out only for those who ask.
+        declination = self._declination() if SensorType.HEADING in wanted else 0.0
+        return FusedEvents(wanted, declination, self._motion)
 
     def _feed(self, events: list[FlatEvent]) -> None:
         if events:
