@@ -64,6 +64,8 @@ class SensorServiceStub(Stub):
                 self._dynamic_changes_told[key] = self._service.dynamic_changes
 
     def _untold(self) -> list[tuple[Peer, str]]:
+        if not self._dynamic_callbacks:
+            return []
         changes = self._service.dynamic_changes
         return [key for key in self._dynamic_callbacks if self._dynamic_changes_told[key] != changes]
 

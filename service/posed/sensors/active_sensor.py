@@ -61,7 +61,7 @@ class ActiveSensor:
         if self.is_one_shot:
             # Off by itself with its first event: what was computed beyond it never happened.
             column = column[: 0 if self.pending else 1]
-        count = len(column)
+        count = len(column.timestamp_ns)
         if not count:
             return
         self.events += count

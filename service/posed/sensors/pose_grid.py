@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from posed.events import FilterStatus
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class PoseGrid:
     """Instants `anchor_ns + k * period`, k = 0, 1, ...; all sample time, ns. The index k is the pose's sequence."""
 

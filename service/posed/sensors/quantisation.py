@@ -73,16 +73,8 @@ class Quantiser:
         if not self._axes or not self._step:
             return column
         values = column.values
-        if values.shape[1] <= self._axes:
-            return EventColumn(column.timestamp_ns, self._rounded(values), column.accuracy)
-        values = values.copy()
-        values[:, : self._axes] = self._rounded(values[:, : self._axes])
-        return EventColumn(column.timestamp_ns, values, column.accuracy)
-
-    def _rounded(
-        self, values: "np.ndarray[tuple[int, int], np.dtype[np.float64]]"
-    ) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-        rounded = values / self._step
-        np.rint(rounded, rounded)
+        rounded = np.rint(values / self._step)
         rounded *= self._step
-        return rounded
+        if values.shape[1] > self._axes:
+            rounded[:, self._axes :] = values[:, self._axes :]
+        return EventColumn(column.timestamp_ns, rounded, column.accuracy)

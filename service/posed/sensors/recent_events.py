@@ -27,7 +27,7 @@ class RecentEventLogger:
 
     def add(self, column: EventColumn, boot_ns: int) -> None:
         """Note events, at least one, taken in at `boot_ns` (CLOCK_BOOTTIME)."""
-        columns, count = self._columns, len(column)
+        columns, count = self._columns, len(column.timestamp_ns)
         columns.append((count, boot_ns, column))
         self._count += count
         self._last_is_current = True
