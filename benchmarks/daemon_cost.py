@@ -171,7 +171,7 @@ def _loop(command: list[str], directory: Path, seconds: float) -> Usage:
     zmq_context = context()
     with Workload([_LOAD, *command], os.environ) as pipeline:
         subscriber = sub(zmq_context, conflate=True)
-        subscriber.subscribe(b"pose/100000\0")
+        subscriber.subscribe(b"pose/100000/")
         subscriber.connect(endpoint(pose_path(directory)))
         subscriber.poll()
         time.sleep(1.0)

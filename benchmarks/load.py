@@ -186,7 +186,7 @@ def bare(directory: Path) -> dict[str, Any]:
         for _ in waiter.readable():
             socket.recv()
         if not waiter.wait(due_ns):
-            socket.send(b"pose/100000\0" + bytes(150))
+            socket.send(b"pose/100000/\0" + bytes(150))
             sent += 1
             due_ns += 100_000_000
     waiter.close()

@@ -288,8 +288,9 @@ says of the connection, never what the client says.
 - Leave the DEALER its default routing id. What comes from a chosen one is dropped.
 - **Control**: one message is one frame is one serialised [Parcel](#parcel) of at most 65,536 bytes. Above 131,072 \
 bytes libzmq closes the connection without a word. A message of several frames (a REQ socket sends such) is dropped.
-- **Pose**: one message is one frame: the topic in ASCII, one zero byte, then a serialised message. `pose/PERIOD_US` \
-carries [PoseMessage](#posemessage), `truth/PERIOD_US` carries [TruthMessage](#truthmessage). Subscribe with topic and \
+- **Pose**: one message is one frame: the topic in ASCII, one zero byte, then a serialised message. \
+`pose/PERIOD_US/FILTER` carries [PoseMessage](#posemessage), `truth/PERIOD_US/FILTER` carries \
+[TruthMessage](#truthmessage). Subscribe with topic and \
 zero byte exactly as [PoseRegistration](#poseregistration) gives them. The daemon's queue for a subscriber holds 10 \
 messages; what finds it full is dropped, and the sequence numbers show it.
 - Heartbeats: the daemon sends ZMTP pings every 900 ms, time to live 1,500 ms (on a pose socket every 3,000 ms, time \

@@ -25,7 +25,7 @@ from posed.client import (
     SensorManager,
     Truth,
 )
-from posed.errors import InvalidArgumentError
+from posed.errors import InvalidArgumentError, ServiceUnavailableError
 from posed.fusion import DEFAULT_FILTER
 
 Eventually = Callable[[Callable[[], object]], None]
@@ -97,6 +97,32 @@ def test_poses_come_on_their_grid_with_the_events_of_table_2(desk: Any, mode: in
     assert 0 < last.heading_accuracy < math.pi
     assert last.position is None
     assert last.age_s < 5
+
+
+def test_clients_of_two_filters_get_the_poses_of_each_at_the_same_instants(desk: Any) -> None:
+    desk.serve("--source", "sim:look-around", "--filter", "dcm-adaptive,dcm")
+    truths: list[Truth] = []
+    with (
+        PoseClient(SENSOR_DELAY_GAME, every=True) as first,
+        PoseClient(SENSOR_DELAY_GAME, filter="dcm", every=True, on_truth=truths.append) as second,
+    ):
+        poses = {client: [client.next_pose(timeout_s=5) for _ in range(15)] for client in (first, second)}
+    names = [{pose.filter for pose in given if pose is not None} for given in poses.values()]
+    assert names == [{"dcm-adaptive"}, {"dcm"}]
+    instants = [{p.sequence: p.timestamp_ns for p in given if p is not None} for given in poses.values()]
+    shared = instants[0].keys() & instants[1].keys()
+    assert len(shared) >= 10
+    assert [instants[0][sequence] for sequence in shared] == [instants[1][sequence] for sequence in shared]
+    assert truths
+
+
+def test_a_client_of_a_filter_that_does_not_run_is_told_which_do(desk: Any) -> None:
+    desk.serve("--source", "sim:still", "--filter", "dcm,dcm-adaptive")
+    with PoseClient(filter="vqf") as client, pytest.raises(ServiceUnavailableError, match="only dcm, dcm-adaptive"):
+        client.wait_connected(5)
+    assert "filter dcm,dcm-adaptive" in desk.posed("status").stdout
+    watched = desk.posed("watch", "--filter", "dcm-adaptive", "--json", "--count", "1")
+    assert json.loads(watched.stdout)["filter"] == "dcm-adaptive"
 
 
 def test_the_fastest_client_sets_the_mode_and_the_others_are_told(desk: Any, eventually: Eventually) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from posed.clock import VirtualClock
+from posed.errors import InvalidArgumentError
 from posed.evaluation.measures import heading_error, to_magnetic_north, total_error
 from posed.events import Pose, RateMode
 from posed.hal import open_source
@@ -87,6 +88,47 @@ def test_changing_the_mode_live_takes_effect_within_a_second_and_makes_no_headin
         events = sum(pose.events_fused for pose in settled) / 4
         assert events == pytest.approx({"NORMAL": 25, "UI": 45, "GAME": 150, "FASTEST": 350}[mode.name], rel=0.05)
         before = settled[-1]
+
+
+def test_filters_side_by_side_get_the_same_events_and_give_what_each_gives_alone() -> None:
+    profile = load_profile("patonis2018")
+
+    def poses(names: list[str], asked: list[tuple[str, RateMode]]) -> dict[str, list[Pose]]:
+        clock = VirtualClock(1_000_000_000)
+        first, *beside = (make_device_filter(name, profile) for name in names)
+        service = SensorService(open_source("sim:look-around", profile, clock), first, clock, beside=beside)
+        for name, mode in asked:
+            service.register_pose(name, 100_000, mode.sampling_period_us, name)
+        given: dict[str, list[Pose]] = {}
+        for _ in range(50):
+            clock.advance_to(clock.now_ns() + 100_000_000)
+            service.advance()
+            for pose in service.take_poses():
+                given.setdefault(pose.filter_name, []).append(pose)
+        return given
+
+    both = poses(["dcm-adaptive", "dcm"], [("dcm-adaptive", RateMode.NORMAL), ("dcm", RateMode.GAME)])
+    # The faster of the two sets the rate for both, and both say so.
+    assert both == poses(["dcm-adaptive"], [("dcm-adaptive", RateMode.GAME)]) | poses(["dcm"], [("dcm", RateMode.GAME)])
+    assert [p.sequence for p in both["dcm"]] == [p.sequence for p in both["dcm-adaptive"]]
+    assert both["dcm"][-1].orientation != both["dcm-adaptive"][-1].orientation
+
+
+def test_a_pose_stream_can_move_to_another_filter_and_only_to_one_that_runs() -> None:
+    profile = load_profile("patonis2018")
+    clock = VirtualClock(1_000_000_000)
+    filters = [make_device_filter(name, profile) for name in ("dcm-adaptive", "dcm")]
+    service = SensorService(open_source("sim:still", profile, clock), filters[0], clock, beside=filters[1:])
+    service.register_pose("a", 100_000, 0)
+    with pytest.raises(InvalidArgumentError, match=r"'vqf' does not run here.*--filter dcm-adaptive,dcm,vqf"):
+        service.register_pose("a", 100_000, 0, "vqf")
+    for name in ("dcm-adaptive", "dcm"):
+        service.register_pose("a", 100_000, 0, name)
+        clock.advance_to(clock.now_ns() + 1_000_000_000)
+        service.advance()
+        assert {pose.filter_name for pose in service.take_poses()} == {name}
+    service.unregister_pose("a")
+    assert service.next_deadline_ns() is None
 
 
 def test_a_replay_bound_again_after_a_pause_has_its_first_pose_at_once(tmp_path: Path) -> None:

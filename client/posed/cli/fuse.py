@@ -14,7 +14,13 @@ from typing import TextIO
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from posed.cli.options import add_aligned_option, add_pose_rate_option, add_profile_option, add_rate_mode_option
+from posed.cli.options import (
+    add_aligned_option,
+    add_filters_option,
+    add_pose_rate_option,
+    add_profile_option,
+    add_rate_mode_option,
+)
 from posed.errors import InvalidArgumentError
 from posed.evaluation.fuse import fuse_recording
 from posed.events import Pose, RateMode
@@ -31,13 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the recording and how to fuse it."""
     parser.add_argument("recording", type=Path, metavar="RECORDING", help="a FILE.csv or the folder of a trial")
     add_rate_mode_option(parser)
-    parser.add_argument(
-        "--filter",
-        type=_filters,
-        default=(DEFAULT_FILTER,),
-        metavar="NAME,NAME",
-        help=f"orientation filters, one or several side by side (default: {DEFAULT_FILTER})",
-    )
+    add_filters_option(parser, (DEFAULT_FILTER,))
     add_profile_option(parser, "patonis2018")
     add_pose_rate_option(parser)
     add_aligned_option(parser)
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
             pose_period_us=round(1e6 / arguments.rate),
             aligned=arguments.aligned,
         )
-        for name in arguments.filter
+        for name in arguments.filters
     ]
     poses = heapq.merge(*streams, key=lambda pose: pose.instant_ns)
     # A recording that cannot be fused says so at its first pose: before anything is written.
@@ -93,13 +93,6 @@ def csv_row(pose: Pose) -> str:
         f"{pose.sequence},{orientation.timestamp_ns},{','.join(map(repr, numbers))},{int(orientation.status)},"
         f"{pose.rate_mode.name},{pose.events_fused},{pose.filter_name},{pose.predicted_ns}\n"
     )
-
-
-def _filters(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    if len(set(names)) != len(names):
-        raise argparse.ArgumentTypeError(f"{text!r} names a filter twice")
-    return names
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ from typing import Any
 
 RATE_MODES = ("NORMAL", "UI", "GAME", "FASTEST")
 
-_DAEMON_OPTIONS = ("source", "profile", "filter", "seed", "speed", "loop", "position", "aligned", "log_format")
+_DAEMON_OPTIONS = ("source", "profile", "filters", "seed", "speed", "loop", "position", "aligned", "log_format")
 
 
 def add_daemon_options(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def add_daemon_options(parser: argparse.ArgumentParser) -> None:
         help="where samples come from: sim, sim:SCRIPT or replay:PATH (default: sim)",
     )
     add_profile_option(group)
-    add_filter_option(group)
+    add_filters_option(group)
     group.add_argument("--seed", type=int, metavar="N", help="of the simulated phone's noise and errors (default: 0)")
     group.add_argument("--speed", type=float, metavar="X", help="of a replay, times real time (default: 1)")
     group.add_argument("--loop", action="store_true", help="begin a replay again when it ends")
@@ -47,9 +47,16 @@ def add_profile_option(parser: "argparse._ActionsContainer", default: str = argp
     )
 
 
-def add_filter_option(parser: "argparse._ActionsContainer", default: str = argparse.SUPPRESS) -> None:
-    """Add --filter."""
-    parser.add_argument("--filter", default=default, metavar="NAME", help="orientation filter (default: dcm-adaptive)")
+def add_filters_option(parser: "argparse._ActionsContainer", default: Any = argparse.SUPPRESS) -> None:
+    """Add --filter, one or several names, as `filters`."""
+    parser.add_argument(
+        "--filter",
+        dest="filters",
+        type=_filters,
+        default=default,
+        metavar="NAME,NAME",
+        help="orientation filters, one or several side by side (default: dcm-adaptive)",
+    )
 
 
 def add_aligned_option(parser: "argparse._ActionsContainer") -> None:
@@ -91,6 +98,8 @@ def daemon_command_line(options: dict[str, Any]) -> list[str]:
         option = f"--{name.replace('_', '-')}"
         if name == "position":
             value = ",".join(map(repr, value))
+        elif name == "filters":
+            option, value = "--filter", ",".join(value)
         words.append(option if value is True else f"{option}={value}")
     return words
 
@@ -129,6 +138,13 @@ def _pose_rate(text: str) -> float:
     if not 1 <= rate <= 200:
         raise argparse.ArgumentTypeError(f"{text!r} is no pose rate; give 1 to 200 Hz")
     return rate
+
+
+def _filters(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    if len(set(names)) != len(names):
+        raise argparse.ArgumentTypeError(f"{text!r} names a filter twice")
+    return names
 
 
 def _source(text: str) -> str:

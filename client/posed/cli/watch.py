@@ -32,6 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to ask for and how to show it."""
     add_rate_mode_option(parser)
     add_pose_rate_option(parser)
+    parser.add_argument("--filter", metavar="NAME", help="which of the daemon's filters (default: its first)")
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     parser.add_argument("--count", type=positive_count, metavar="N", help="end after N poses")
     parser.epilog = f"""\
@@ -48,7 +49,11 @@ def run(arguments: argparse.Namespace) -> int:
     view = LiveView()
     try:
         with PoseClient(
-            rate_mode, pose_rate_hz=arguments.rate, every=True, on_service_connected=view.count_connection
+            rate_mode,
+            pose_rate_hz=arguments.rate,
+            filter=arguments.filter,
+            every=True,
+            on_service_connected=view.count_connection,
         ) as client:
             if arguments.json:
                 print_poses(client, pose_json, count=arguments.count)

@@ -30,6 +30,8 @@ _BACKLOG = 1000
 class PoseClient:
     """Poses at `pose_rate_hz` (1 to 200), from sensors at `rate_mode` (a SENSOR_DELAY code or a period in us).
 
+    filter names one of the daemon's filters (`posed serve --filter NAME,NAME`); None is its first.
+
     Iterating gives the newest pose each time; with every=True each pose in turn. Either way `Pose.missed` counts what
     was passed over. A daemon that is absent, dies or returns shows in `state`, never as an exception in the loop.
     Callbacks run on a thread of the client's own: on_pose(pose), on_truth(truth) (asks for the truth stream),
@@ -41,6 +43,7 @@ class PoseClient:
         rate_mode: int = SENSOR_DELAY_GAME,
         *,
         pose_rate_hz: float = 10.0,
+        filter: str | None = None,
         every: bool = False,
         auto_create: bool = False,
         on_pose: Callable[[Pose], None] | None = None,
@@ -51,6 +54,7 @@ class PoseClient:
     ) -> None:
         self._sampling_period_us = _sampling_period_us(rate_mode)
         self._pose_period_us = _pose_period_us(pose_rate_hz)
+        self._filter = filter
         self._every = every
         self._on_pose = on_pose
         self._on_truth = on_truth
@@ -188,6 +192,7 @@ class PoseClient:
                 listener=_LISTENER,
                 pose_period_us=self._pose_period_us,
                 sampling_period_us=self._sampling_period_us,
+                filter=self._filter or "",
             )
         )
         self._configured(registration.configuration)

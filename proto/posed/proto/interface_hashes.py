@@ -9,6 +9,6 @@ HASHES = {
     "posed.ISensorService": "53f2c55b5533508ac329be8a5c4577648df1c378099ca2fc381c84dc36d18de2",
     "posed.ISensorEventListener": "53f2c55b5533508ac329be8a5c4577648df1c378099ca2fc381c84dc36d18de2",
     "posed.IDynamicSensorCallback": "53f2c55b5533508ac329be8a5c4577648df1c378099ca2fc381c84dc36d18de2",
-    "posed.IPoseService": "a316e4d9941478d93958efd2ec6a4bdffaf02cd70d29fc7db136453d83949bbf",
-    "posed.IPoseListener": "a316e4d9941478d93958efd2ec6a4bdffaf02cd70d29fc7db136453d83949bbf",
+    "posed.IPoseService": "45fd697a5e4d48f04feed819bd925250f47252cbd12b63c29d7dbfa2cb7ef310",
+    "posed.IPoseListener": "45fd697a5e4d48f04feed819bd925250f47252cbd12b63c29d7dbfa2cb7ef310",
 }

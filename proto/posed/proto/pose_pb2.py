@@ -26,7 +26,7 @@ from posed.proto import binder_pb2 as posed_dot_proto_dot_binder__pb2
 from posed.proto import events_pb2 as posed_dot_proto_dot_events__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x16posed/proto/pose.proto\x12\x05posed\x1a\x18posed/proto/binder.proto\x1a\x18posed/proto/events.proto\"S\n\x0bPoseRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\x12\x16\n\x0epose_period_us\x18\x02 \x01(\x05\x12\x1a\n\x12sampling_period_us\x18\x03 \x01(\x05\")\n\x15UnregisterPoseRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\"\x8b\x01\n\x10PoseRegistration\x12\x12\n\npose_topic\x18\x01 \x01(\x0c\x12\x13\n\x0btruth_topic\x18\x02 \x01(\x0c\x12/\n\rconfiguration\x18\x03 \x01(\x0b\x32\x18.posed.PoseConfiguration\x12\x1d\n\x06\x64\x65vice\x18\x04 \x01(\x0b\x32\r.posed.Device\"N\n\x06\x44\x65vice\x12\x0f\n\x07profile\x18\x01 \x01(\t\x12\x16\n\x0e\x63\x61mera_fov_deg\x18\x02 \x01(\x01\x12\x1b\n\x13screen_rotation_deg\x18\x03 \x01(\x05\"c\n\x11PoseConfiguration\x12\"\n\trate_mode\x18\x01 \x01(\x0e\x32\x0f.posed.RateMode\x12\x1a\n\x12sampling_period_us\x18\x02 \x01(\x05\x12\x0e\n\x06\x66ilter\x18\x03 \x01(\t\"O\n\x0bPoseMessage\x12%\n\x06header\x18\x01 \x01(\x0b\x32\x15.posed.DeliveryHeader\x12\x19\n\x04pose\x18\x02 \x01(\x0b\x32\x0b.posed.Pose\"\xa9\x02\n\x04Pose\x12\x14\n\x0ctimestamp_ns\x18\x01 \x01(\x12\x12&\n\x0borientation\x18\x02 \x01(\x0b\x32\x11.posed.Quaternion\x12$\n\x0c\x61ngular_rate\x18\x03 \x01(\x0b\x32\x0e.posed.Vector3\x12\x18\n\x10heading_accuracy\x18\x04 \x01(\x01\x12\x0e\n\x06\x66ilter\x18\x05 \x01(\t\x12\x0e\n\x06status\x18\x06 \x01(\r\x12\"\n\trate_mode\x18\x07 \x01(\x0e\x32\x0f.posed.RateMode\x12\x14\n\x0c\x65vents_fused\x18\x08 \x01(\r\x12&\n\x08position\x18\t \x01(\x0b\x32\x0f.posed.PositionH\x00\x88\x01\x01\x12\x14\n\x0cpredicted_ns\x18\n \x01(\x03\x42\x0b\n\t_position\"8\n\nQuaternion\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\x12\t\n\x01w\x18\x04 \x01(\x01\"*\n\x07Vector3\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\"\xc3\x01\n\x08Position\x12\x14\n\x0clatitude_deg\x18\x01 \x01(\x01\x12\x15\n\rlongitude_deg\x18\x02 \x01(\x01\x12\x1c\n\x14\x65llipsoidal_height_m\x18\x03 \x01(\x01\x12\x16\n\x0e\x63ovariance_enu\x18\x04 \x03(\x01\x12$\n\x0cvelocity_enu\x18\x05 \x01(\x0b\x32\x0e.posed.Vector3\x12\x0e\n\x06source\x18\x06 \x01(\t\x12\x13\n\x06\x61ge_ns\x18\x07 \x01(\x12H\x00\x88\x01\x01\x42\t\n\x07_age_ns\"R\n\x0cTruthMessage\x12%\n\x06header\x18\x01 \x01(\x0b\x32\x15.posed.DeliveryHeader\x12\x1b\n\x05truth\x18\x02 \x01(\x0b\x32\x0c.posed.Truth\"\xc3\x02\n\x05Truth\x12\x14\n\x0ctimestamp_ns\x18\x01 \x01(\x12\x12&\n\x0borientation\x18\x02 \x01(\x0b\x32\x11.posed.Quaternion\x12\x13\n\x0b\x64\x65\x63lination\x18\x03 \x01(\x01\x12)\n\x0cposition_enu\x18\x04 \x01(\x0b\x32\x0e.posed.Vector3H\x00\x88\x01\x01\x12\x12\n\ninstant_ns\x18\x05 \x01(\x12\x12\x33\n\x13instant_orientation\x18\x06 \x01(\x0b\x32\x11.posed.QuaternionH\x01\x88\x01\x01\x12\x31\n\x14instant_position_enu\x18\x07 \x01(\x0b\x32\x0e.posed.Vector3H\x02\x88\x01\x01\x42\x0f\n\r_position_enuB\x16\n\x14_instant_orientationB\x17\n\x15_instant_position_enu*s\n\x08RateMode\x12\x15\n\x11RATE_MODE_FASTEST\x10\x00\x12\x12\n\x0eRATE_MODE_GAME\x10\x01\x12\x10\n\x0cRATE_MODE_UI\x10\x02\x12\x14\n\x10RATE_MODE_NORMAL\x10\x03\x12\x14\n\x10RATE_MODE_CUSTOM\x10\x04\x32\x8f\x01\n\x0cIPoseService\x12;\n\x0cregisterPose\x12\x12.posed.PoseRequest\x1a\x17.posed.PoseRegistration\x12<\n\x0eunregisterPose\x12\x1c.posed.UnregisterPoseRequest\x1a\x0c.posed.Empty\x1a\x04\x88\xb5\x18\x01\x32Z\n\rIPoseListener\x12\x43\n\x13onPoseConfiguration\x12\x18.posed.PoseConfiguration\x1a\x0c.posed.Empty\"\x04\x88\xb5\x18\x01\x1a\x04\x88\xb5\x18\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x16posed/proto/pose.proto\x12\x05posed\x1a\x18posed/proto/binder.proto\x1a\x18posed/proto/events.proto\"c\n\x0bPoseRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\x12\x16\n\x0epose_period_us\x18\x02 \x01(\x05\x12\x1a\n\x12sampling_period_us\x18\x03 \x01(\x05\x12\x0e\n\x06\x66ilter\x18\x04 \x01(\t\")\n\x15UnregisterPoseRequest\x12\x10\n\x08listener\x18\x01 \x01(\t\"\x8b\x01\n\x10PoseRegistration\x12\x12\n\npose_topic\x18\x01 \x01(\x0c\x12\x13\n\x0btruth_topic\x18\x02 \x01(\x0c\x12/\n\rconfiguration\x18\x03 \x01(\x0b\x32\x18.posed.PoseConfiguration\x12\x1d\n\x06\x64\x65vice\x18\x04 \x01(\x0b\x32\r.posed.Device\"N\n\x06\x44\x65vice\x12\x0f\n\x07profile\x18\x01 \x01(\t\x12\x16\n\x0e\x63\x61mera_fov_deg\x18\x02 \x01(\x01\x12\x1b\n\x13screen_rotation_deg\x18\x03 \x01(\x05\"c\n\x11PoseConfiguration\x12\"\n\trate_mode\x18\x01 \x01(\x0e\x32\x0f.posed.RateMode\x12\x1a\n\x12sampling_period_us\x18\x02 \x01(\x05\x12\x0e\n\x06\x66ilter\x18\x03 \x01(\t\"O\n\x0bPoseMessage\x12%\n\x06header\x18\x01 \x01(\x0b\x32\x15.posed.DeliveryHeader\x12\x19\n\x04pose\x18\x02 \x01(\x0b\x32\x0b.posed.Pose\"\xa9\x02\n\x04Pose\x12\x14\n\x0ctimestamp_ns\x18\x01 \x01(\x12\x12&\n\x0borientation\x18\x02 \x01(\x0b\x32\x11.posed.Quaternion\x12$\n\x0c\x61ngular_rate\x18\x03 \x01(\x0b\x32\x0e.posed.Vector3\x12\x18\n\x10heading_accuracy\x18\x04 \x01(\x01\x12\x0e\n\x06\x66ilter\x18\x05 \x01(\t\x12\x0e\n\x06status\x18\x06 \x01(\r\x12\"\n\trate_mode\x18\x07 \x01(\x0e\x32\x0f.posed.RateMode\x12\x14\n\x0c\x65vents_fused\x18\x08 \x01(\r\x12&\n\x08position\x18\t \x01(\x0b\x32\x0f.posed.PositionH\x00\x88\x01\x01\x12\x14\n\x0cpredicted_ns\x18\n \x01(\x03\x42\x0b\n\t_position\"8\n\nQuaternion\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\x12\t\n\x01w\x18\x04 \x01(\x01\"*\n\x07Vector3\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\"\xc3\x01\n\x08Position\x12\x14\n\x0clatitude_deg\x18\x01 \x01(\x01\x12\x15\n\rlongitude_deg\x18\x02 \x01(\x01\x12\x1c\n\x14\x65llipsoidal_height_m\x18\x03 \x01(\x01\x12\x16\n\x0e\x63ovariance_enu\x18\x04 \x03(\x01\x12$\n\x0cvelocity_enu\x18\x05 \x01(\x0b\x32\x0e.posed.Vector3\x12\x0e\n\x06source\x18\x06 \x01(\t\x12\x13\n\x06\x61ge_ns\x18\x07 \x01(\x12H\x00\x88\x01\x01\x42\t\n\x07_age_ns\"R\n\x0cTruthMessage\x12%\n\x06header\x18\x01 \x01(\x0b\x32\x15.posed.DeliveryHeader\x12\x1b\n\x05truth\x18\x02 \x01(\x0b\x32\x0c.posed.Truth\"\xc3\x02\n\x05Truth\x12\x14\n\x0ctimestamp_ns\x18\x01 \x01(\x12\x12&\n\x0borientation\x18\x02 \x01(\x0b\x32\x11.posed.Quaternion\x12\x13\n\x0b\x64\x65\x63lination\x18\x03 \x01(\x01\x12)\n\x0cposition_enu\x18\x04 \x01(\x0b\x32\x0e.posed.Vector3H\x00\x88\x01\x01\x12\x12\n\ninstant_ns\x18\x05 \x01(\x12\x12\x33\n\x13instant_orientation\x18\x06 \x01(\x0b\x32\x11.posed.QuaternionH\x01\x88\x01\x01\x12\x31\n\x14instant_position_enu\x18\x07 \x01(\x0b\x32\x0e.posed.Vector3H\x02\x88\x01\x01\x42\x0f\n\r_position_enuB\x16\n\x14_instant_orientationB\x17\n\x15_instant_position_enu*s\n\x08RateMode\x12\x15\n\x11RATE_MODE_FASTEST\x10\x00\x12\x12\n\x0eRATE_MODE_GAME\x10\x01\x12\x10\n\x0cRATE_MODE_UI\x10\x02\x12\x14\n\x10RATE_MODE_NORMAL\x10\x03\x12\x14\n\x10RATE_MODE_CUSTOM\x10\x04\x32\x8f\x01\n\x0cIPoseService\x12;\n\x0cregisterPose\x12\x12.posed.PoseRequest\x1a\x17.posed.PoseRegistration\x12<\n\x0eunregisterPose\x12\x1c.posed.UnregisterPoseRequest\x1a\x0c.posed.Empty\x1a\x04\x88\xb5\x18\x02\x32Z\n\rIPoseListener\x12\x43\n\x13onPoseConfiguration\x12\x18.posed.PoseConfiguration\x1a\x0c.posed.Empty\"\x04\x88\xb5\x18\x01\x1a\x04\x88\xb5\x18\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,39 +34,39 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'posed.proto.pose_pb2', _glo
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_IPOSESERVICE']._loaded_options = None
-  _globals['_IPOSESERVICE']._serialized_options = b'\210\265\030\001'
+  _globals['_IPOSESERVICE']._serialized_options = b'\210\265\030\002'
   _globals['_IPOSELISTENER']._loaded_options = None
   _globals['_IPOSELISTENER']._serialized_options = b'\210\265\030\001'
   _globals['_IPOSELISTENER'].methods_by_name['onPoseConfiguration']._loaded_options = None
   _globals['_IPOSELISTENER'].methods_by_name['onPoseConfiguration']._serialized_options = b'\210\265\030\001'
-  _globals['_RATEMODE']._serialized_start=1627
-  _globals['_RATEMODE']._serialized_end=1742
+  _globals['_RATEMODE']._serialized_start=1643
+  _globals['_RATEMODE']._serialized_end=1758
   _globals['_POSEREQUEST']._serialized_start=85
-  _globals['_POSEREQUEST']._serialized_end=168
-  _globals['_UNREGISTERPOSEREQUEST']._serialized_start=170
-  _globals['_UNREGISTERPOSEREQUEST']._serialized_end=211
-  _globals['_POSEREGISTRATION']._serialized_start=214
-  _globals['_POSEREGISTRATION']._serialized_end=353
-  _globals['_DEVICE']._serialized_start=355
-  _globals['_DEVICE']._serialized_end=433
-  _globals['_POSECONFIGURATION']._serialized_start=435
-  _globals['_POSECONFIGURATION']._serialized_end=534
-  _globals['_POSEMESSAGE']._serialized_start=536
-  _globals['_POSEMESSAGE']._serialized_end=615
-  _globals['_POSE']._serialized_start=618
-  _globals['_POSE']._serialized_end=915
-  _globals['_QUATERNION']._serialized_start=917
-  _globals['_QUATERNION']._serialized_end=973
-  _globals['_VECTOR3']._serialized_start=975
-  _globals['_VECTOR3']._serialized_end=1017
-  _globals['_POSITION']._serialized_start=1020
-  _globals['_POSITION']._serialized_end=1215
-  _globals['_TRUTHMESSAGE']._serialized_start=1217
-  _globals['_TRUTHMESSAGE']._serialized_end=1299
-  _globals['_TRUTH']._serialized_start=1302
-  _globals['_TRUTH']._serialized_end=1625
-  _globals['_IPOSESERVICE']._serialized_start=1745
-  _globals['_IPOSESERVICE']._serialized_end=1888
-  _globals['_IPOSELISTENER']._serialized_start=1890
-  _globals['_IPOSELISTENER']._serialized_end=1980
+  _globals['_POSEREQUEST']._serialized_end=184
+  _globals['_UNREGISTERPOSEREQUEST']._serialized_start=186
+  _globals['_UNREGISTERPOSEREQUEST']._serialized_end=227
+  _globals['_POSEREGISTRATION']._serialized_start=230
+  _globals['_POSEREGISTRATION']._serialized_end=369
+  _globals['_DEVICE']._serialized_start=371
+  _globals['_DEVICE']._serialized_end=449
+  _globals['_POSECONFIGURATION']._serialized_start=451
+  _globals['_POSECONFIGURATION']._serialized_end=550
+  _globals['_POSEMESSAGE']._serialized_start=552
+  _globals['_POSEMESSAGE']._serialized_end=631
+  _globals['_POSE']._serialized_start=634
+  _globals['_POSE']._serialized_end=931
+  _globals['_QUATERNION']._serialized_start=933
+  _globals['_QUATERNION']._serialized_end=989
+  _globals['_VECTOR3']._serialized_start=991
+  _globals['_VECTOR3']._serialized_end=1033
+  _globals['_POSITION']._serialized_start=1036
+  _globals['_POSITION']._serialized_end=1231
+  _globals['_TRUTHMESSAGE']._serialized_start=1233
+  _globals['_TRUTHMESSAGE']._serialized_end=1315
+  _globals['_TRUTH']._serialized_start=1318
+  _globals['_TRUTH']._serialized_end=1641
+  _globals['_IPOSESERVICE']._serialized_start=1761
+  _globals['_IPOSESERVICE']._serialized_end=1904
+  _globals['_IPOSELISTENER']._serialized_start=1906
+  _globals['_IPOSELISTENER']._serialized_end=1996
 # @@protoc_insertion_point(module_scope)

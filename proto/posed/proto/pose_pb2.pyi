@@ -23,14 +23,16 @@ RATE_MODE_NORMAL: RateMode
 RATE_MODE_CUSTOM: RateMode
 
 class PoseRequest(_message.Message):
-    __slots__ = ("listener", "pose_period_us", "sampling_period_us")
+    __slots__ = ("listener", "pose_period_us", "sampling_period_us", "filter")
     LISTENER_FIELD_NUMBER: _ClassVar[int]
     POSE_PERIOD_US_FIELD_NUMBER: _ClassVar[int]
     SAMPLING_PERIOD_US_FIELD_NUMBER: _ClassVar[int]
+    FILTER_FIELD_NUMBER: _ClassVar[int]
     listener: str
     pose_period_us: int
     sampling_period_us: int
-    def __init__(self, listener: _Optional[str] = ..., pose_period_us: _Optional[int] = ..., sampling_period_us: _Optional[int] = ...) -> None: ...
+    filter: str
+    def __init__(self, listener: _Optional[str] = ..., pose_period_us: _Optional[int] = ..., sampling_period_us: _Optional[int] = ..., filter: _Optional[str] = ...) -> None: ...
 
 class UnregisterPoseRequest(_message.Message):
     __slots__ = ("listener",)

@@ -14,7 +14,8 @@ class DaemonConfig:
     """`sim[:SCRIPT]` or `replay:PATH`."""
     profile: str = "patonis2018"
     """A shipped device profile's name or a path to a TOML file."""
-    filter: str = DEFAULT_FILTER
+    filters: tuple[str, ...] = (DEFAULT_FILTER,)
+    """The first gives the fused sensors, and the poses of those who name no other; all are fed the same events."""
     seed: int = 0
     """Of the simulated phone's noise and errors."""
     speed: float = 1.0

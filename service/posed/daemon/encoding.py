@@ -9,14 +9,14 @@ from posed.proto import events_pb2, pose_pb2, sensors_pb2
 from posed.sensors import EventChunk
 
 
-def pose_topic(period_us: int) -> bytes:
-    """Return the topic of the poses of one period, zero byte included."""
-    return b"pose/%d\0" % period_us
+def pose_topic(period_us: int, filter_name: str) -> bytes:
+    """Return the topic of a filter's poses of one period, zero byte included."""
+    return f"pose/{period_us}/{filter_name}\0".encode("ascii")
 
 
-def truth_topic(period_us: int) -> bytes:
-    """Return the topic of the truth beside the poses of one period, zero byte included."""
-    return b"truth/%d\0" % period_us
+def truth_topic(period_us: int, filter_name: str) -> bytes:
+    """Return the topic of the truth beside a filter's poses of one period, zero byte included."""
+    return f"truth/{period_us}/{filter_name}\0".encode("ascii")
 
 
 def delivery_header(boot_id: bytes, sequence: int, published_ns: int, mapping: TimeMap) -> events_pb2.DeliveryHeader:

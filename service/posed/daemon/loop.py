@@ -67,12 +67,13 @@ class _Daemon:
         self._source = open_source(
             config.source, profile, clock, seed=config.seed, speed=config.speed, loop=config.loop
         )
-        orientation_filter = make_device_filter(config.filter, profile)
+        first, *beside = (make_device_filter(name, profile) for name in config.filters)
         self._service = SensorService(
             self._source,
-            orientation_filter,
+            first,
             clock,
             config.position,
+            beside=beside,
             aligned=config.aligned,
             declination=declination_at(config.position),
             errors=device_errors(profile),
@@ -89,7 +90,7 @@ class _Daemon:
         )
         services: dict[str, Stub] = {
             "sensorservice": self._sensors,
-            "poseservice": PoseServiceStub(self._service, config.filter, profile),
+            "poseservice": PoseServiceStub(self._service, profile),
         }
         self._manager = ServiceManagerStub(
             services, self._server.peers, self._lifecycle, clients, clock, self._boot_id, config

@@ -93,7 +93,7 @@ class ServiceManagerStub(Stub):
             connections=len(self._peers),
             source=self._config.source,
             profile=self._config.profile,
-            filter=self._config.filter,
+            filter=",".join(self._config.filters),
             version=__version__,
         )
 

@@ -18,15 +18,15 @@ class PoseServiceStub(Stub):
 
     descriptor = pose_pb2.DESCRIPTOR.services_by_name["IPoseService"]
 
-    def __init__(self, service: SensorService, filter_name: str, profile: DeviceProfile) -> None:
+    def __init__(self, service: SensorService, profile: DeviceProfile) -> None:
         self._service = service
-        self._filter_name = filter_name
         self._device = pose_pb2.Device(
             profile=profile.name,
             camera_fov_deg=profile.camera_fov_deg,
             screen_rotation_deg=profile.screen_rotation_deg,
         )
-        self._listeners: dict[tuple[Peer, str], Proxy] = {}
+        self._listeners: dict[tuple[Peer, str], tuple[Proxy, str]] = {}
+        """Callback objects, and the filter that each gets its poses from."""
         self._watched: set[Peer] = set()
 
     def registerPose(self, request: pose_pb2.PoseRequest, caller: Caller) -> pose_pb2.PoseRegistration:
@@ -34,16 +34,17 @@ class PoseServiceStub(Stub):
             raise InvalidArgumentError("the request names no listener; give the name of its callback object")
         key = (caller.peer, request.listener)
         before_us = self._service.pose_sampling_period_us
-        self._service.register_pose(key, request.pose_period_us, request.sampling_period_us)
+        filter_name = request.filter or self._service.filter_names[0]
+        self._service.register_pose(key, request.pose_period_us, request.sampling_period_us, filter_name)
         self._tell_if_changed(before_us, besides=key)
         if caller.peer not in self._watched:
             self._watched.add(caller.peer)
             caller.peer.link_to_death(lambda: self._peer_died(caller.peer))
-        self._listeners[key] = caller.peer.proxy(_LISTENER, request.listener)
+        self._listeners[key] = caller.peer.proxy(_LISTENER, request.listener), filter_name
         return pose_pb2.PoseRegistration(
-            pose_topic=encoding.pose_topic(request.pose_period_us),
-            truth_topic=encoding.truth_topic(request.pose_period_us),
-            configuration=self._configuration(),
+            pose_topic=encoding.pose_topic(request.pose_period_us, filter_name),
+            truth_topic=encoding.truth_topic(request.pose_period_us, filter_name),
+            configuration=self._configuration(filter_name),
             device=self._device,
         )
 
@@ -65,16 +66,16 @@ class PoseServiceStub(Stub):
     def _tell_if_changed(self, before_us: int | None, besides: tuple[Peer, str]) -> None:
         if self._service.pose_sampling_period_us in (before_us, None):
             return
-        for key, proxy in self._listeners.items():
+        for key, (proxy, filter_name) in self._listeners.items():
             if key != besides:
-                proxy.onPoseConfiguration(self._configuration())
+                proxy.onPoseConfiguration(self._configuration(filter_name))
 
-    def _configuration(self) -> pose_pb2.PoseConfiguration:
+    def _configuration(self, filter_name: str) -> pose_pb2.PoseConfiguration:
         sampling_us = self._service.pose_sampling_period_us or 0
         return pose_pb2.PoseConfiguration(
             rate_mode=cast("pose_pb2.RateMode", RateMode.of_period(sampling_us)),
             sampling_period_us=sampling_us,
-            filter=self._filter_name,
+            filter=filter_name,
         )
 
 

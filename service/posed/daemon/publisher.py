@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 
 
 class PosePublisher:
-    """Sends the newest pose of each period to whoever subscribed; encodes nothing that nobody wants."""
+    """Sends the newest pose of each filter and period to whoever subscribed; encodes nothing that nobody wants."""
 
     def __init__(
         self,
@@ -53,17 +53,17 @@ class PosePublisher:
                 self._topics.discard(message[1:])
 
     def publish(self, poses: list[Pose]) -> None:
-        """Send the newest of the poses of each period; older ones came too late and are counted as skipped."""
-        newest = {pose.period_us: pose for pose in poses}
+        """Send each filter's newest pose of each period; older ones came too late and are counted as skipped."""
+        newest = {(pose.period_us, pose.filter_name): pose for pose in poses}
         self._statistics.skipped += len(poses) - len(newest)
-        for pose in newest.values():
+        for stream, pose in newest.items():
             mapping = self._source.time_map
             now_ns = self._clock.now_ns()
-            topic = encoding.pose_topic(pose.period_us)
+            topic = encoding.pose_topic(*stream)
             if topic in self._topics:
                 self.socket.send(topic + self._encoder.encode(pose, now_ns, mapping))
                 self._statistics.add(now_ns - mapping.to_boot(pose.instant_ns))
-            topic = encoding.truth_topic(pose.period_us)
+            topic = encoding.truth_topic(*stream)
             if topic in self._topics:
                 self._publish_truth(topic, pose)
 

@@ -59,12 +59,18 @@ class PoseFusion:
         self._position = position
         self._requests: dict[Hashable, _PoseRequest] = {}
         self._grids: dict[int, PoseGrid | None] = {}
-        """By pose period; None until the first sample, which anchors them, has been fused."""
+        """By pose period; None until the first sample, which anchors those of every filter, has come."""
         self._anchor_ns: int | None = None
-        self._rate_mode = RateMode.CUSTOM
+        self.rate_mode = RateMode.CUSTOM
+        """What the poses say of how fast the sensors run."""
         self._poses: list[Pose] = []
         self.events_fused = 0
         self.cpu_ns = 0
+
+    @property
+    def filter_name(self) -> str:
+        """Whose poses these are."""
+        return self._filter.name
 
     @property
     def sampling_period_us(self) -> int | None:
@@ -73,7 +79,7 @@ class PoseFusion:
 
     @property
     def awaits_first_sample(self) -> bool:
-        """True if poses are wanted and no sample has been fused yet."""
+        """True if poses are wanted and no sample has come yet."""
         return None in self._grids.values()
 
     def request(self, key: Hashable, pose_period_us: int, sampling_period_us: int, now_ns: int) -> None:
@@ -108,11 +114,11 @@ class PoseFusion:
 
         Returns the events of the wanted fused sensors by handle, one for each accelerometer event.
         """
-        if not self._grids and not wanted:
-            return {}
         if events and self._anchor_ns is None:
             self._anchor_ns = events[0][1]
             self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
+        if not self._grids and not wanted:
+            return {}
         started = self._clock.cpu_ns()
         done = 0
         fused = self._fused_events(wanted) if wanted else None
@@ -134,9 +140,6 @@ class PoseFusion:
         return poses
 
     def _follow_requests(self, now_ns: int) -> None:
-        sampling_us = self.sampling_period_us
-        if sampling_us is not None:
-            self._rate_mode = RateMode.of_period(sampling_us)
         periods = {request.pose_period_us for request in self._requests.values()}
         self._grids = {period: self._grids.get(period) or self._grid(period, now_ns) for period in sorted(periods)}
 
@@ -191,7 +194,7 @@ class PoseFusion:
                     period_us=grid.period_us,
                     orientation=orientation,
                     filter_name=self._filter.name,
-                    rate_mode=self._rate_mode,
+                    rate_mode=self.rate_mode,
                     events_fused=self.events_fused - grid.events_before,
                     position=self._position,
                     predicted_ns=predicted_ns,

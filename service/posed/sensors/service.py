@@ -1,10 +1,10 @@
 """The sensor service: registrations in, events and poses out, one drain of the source at a time."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError, InvalidStateError, PosedError
-from posed.events import Pose, Position, ReportingMode, SensorInfo, SensorType
+from posed.events import Pose, Position, RateMode, ReportingMode, SensorInfo, SensorType
 from posed.fusion.filter import OrientationFilter, SensorErrors
 from posed.hal.source import SensorSource
 from posed.sensors.active_sensor import ActiveSensor
@@ -23,7 +23,7 @@ _LONGEST_LAG_NS = 5_000_000_000
 
 
 class SensorService:
-    """Android's SensorService over one source and one filter; the caller moves it on with `advance`.
+    """Android's SensorService over one source and its filters; the caller moves it on with `advance`.
 
     Not thread-safe: one loop owns it.
     """
@@ -35,20 +35,27 @@ class SensorService:
         clock: Clock,
         position: Position | None = None,
         *,
+        beside: Sequence[OrientationFilter] = (),
         aligned: bool = False,
         declination: Callable[[], float] | None = None,
         errors: SensorErrors | None = None,
     ) -> None:
-        """Fuse with this filter.
+        """Fuse with this filter, which the fused sensors follow.
 
-        aligned: turn each pose on to its grid instant by the newest angular rate. declination: returns that of the
-        place, rad, east positive; without it there is no heading sensor. errors: of the device's parts, for the filters
-        of virtual sensors.
+        beside: filters with other names that give poses from the same events, to those who ask for theirs.
+        aligned: turn each pose on to its grid instant by the newest angular rate. declination: returns that of
+        the place, rad, east positive; without it there is no heading sensor. errors: of the device's parts, for
+        the filters of virtual sensors.
         """
         self._clock = clock
         self._device = SensorDevice(source, clock)
         self.orientation_filter = orientation_filter
-        self._fusion = PoseFusion(orientation_filter, clock, position, aligned, declination or (lambda: 0.0))
+        self._fusions = [
+            PoseFusion(each, clock, position, aligned, declination or (lambda: 0.0))
+            for each in (orientation_filter, *beside)
+        ]
+        """The service's own first: of these only it makes the events of the fused sensors."""
+        self._fusion = self._fusions[0]
         self._table = SensorTable(
             self._device, clock, errors or SensorErrors(), knows_true_north=declination is not None
         )
@@ -170,23 +177,37 @@ class SensorService:
         if refused:
             raise InvalidStateError("; ".join(refused))
 
-    def register_pose(self, key: Hashable, pose_period_us: int, sampling_period_us: int) -> None:
+    def register_pose(
+        self, key: Hashable, pose_period_us: int, sampling_period_us: int, filter_name: str | None = None
+    ) -> None:
         """Ask for poses every `pose_period_us` from sensors at `sampling_period_us` (0 = fastest), or change that.
 
-        Raises InvalidArgumentError if the source cannot carry a pose or a period is out of range.
+        filter_name: one of `filter_names`; None is the first. Raises InvalidArgumentError if the source cannot carry a
+        pose, a period is out of range or no such filter runs.
         """
+        names = self.filter_names
+        if filter_name is not None and filter_name not in names:
+            raise InvalidArgumentError(
+                f"filter {filter_name!r} does not run here, only {', '.join(names)}; start the daemon with"
+                f" --filter {','.join((*names, filter_name))}"
+            )
         if len(self._table.inputs) < len(FUSION_INPUTS):
             missing = ", ".join(kind.string_type for kind in FUSION_INPUTS if kind not in self._table.inputs.values())
             raise InvalidArgumentError(f"no pose from this source: it has no {missing}")
         self.advance()
-        self._fusion.request(key, pose_period_us, sampling_period_us, self._sample_now_ns())
-        self._table.request_inputs(_POSE, self._fusion.sampling_period_us)
+        chosen = self._fusions[names.index(filter_name) if filter_name else 0]
+        chosen.request(key, pose_period_us, sampling_period_us, self._sample_now_ns())
+        for fusion in self._fusions:
+            if fusion is not chosen:
+                fusion.withdraw(key, self._sample_now_ns())
+        self._follow_pose_requests()
 
     def unregister_pose(self, key: Hashable) -> None:
         """Undo `register_pose`; an unknown key is left alone."""
         self.advance()
-        self._fusion.withdraw(key, self._sample_now_ns())
-        self._table.request_inputs(_POSE, self._fusion.sampling_period_us)
+        for fusion in self._fusions:
+            fusion.withdraw(key, self._sample_now_ns())
+        self._follow_pose_requests()
 
     def set_environment(self, kind: SensorType, value: float) -> None:
         """Set what an ambient sensor of the source reads from now on, in its unit.
@@ -199,23 +220,29 @@ class SensorService:
     @property
     def pose_sampling_period_us(self) -> int | None:
         """The fastest sampling period that any pose registration asks for, us; None without any."""
-        return self._fusion.sampling_period_us
+        periods = (fusion.sampling_period_us for fusion in self._fusions)
+        return min((period for period in periods if period is not None), default=None)
+
+    @property
+    def filter_names(self) -> tuple[str, ...]:
+        """The filters, the one that the fused sensors follow first."""
+        return tuple(fusion.filter_name for fusion in self._fusions)
 
     @property
     def fusion_clients(self) -> int:
         """How many want what the filter says: the pose, and every listener of a fused sensor."""
         listeners = sum(len(sensor.listeners) for sensor in self._table.all if sensor.info.type in FUSED)
-        return listeners + (self._fusion.sampling_period_us is not None)
+        return listeners + (self.pose_sampling_period_us is not None)
 
     @property
     def events_fused(self) -> int:
-        """Events that have reached the filter."""
-        return self._fusion.events_fused
+        """Events that have reached a filter, the one that has got most."""
+        return max(fusion.events_fused for fusion in self._fusions)
 
     @property
     def filter_cpu_ns(self) -> int:
-        """CPU time spent in the filter."""
-        return self._fusion.cpu_ns
+        """CPU time spent in the filters."""
+        return sum(fusion.cpu_ns for fusion in self._fusions)
 
     @property
     def source_cpu_ns(self) -> int:
@@ -258,9 +285,11 @@ class SensorService:
         """Return the CLOCK_BOOTTIME instant (ns) by which `advance` must run next, None if nothing is due."""
         device = self._device
         end_ns = device.end_ns
-        due = [t for t in self._fusion.next_instants_ns() if end_ns is None or t <= end_ns]
-        if self._fusion.awaits_first_sample:
-            due += [t for t in map(device.next_sample_ns, self._table.inputs) if t is not None]
+        due: list[int] = []
+        for fusion in self._fusions:
+            due += [t for t in fusion.next_instants_ns() if end_ns is None or t <= end_ns]
+            if fusion.awaits_first_sample:
+                due += [t for t in map(device.next_sample_ns, self._table.inputs) if t is not None]
         for sensor in self._table.active:
             latency_ns = sensor.latency_ns
             if latency_ns is None:
@@ -286,13 +315,17 @@ class SensorService:
             self._advance_to(self._due_ns)
             self._device.resume()
             now_ns = self._sample_now_ns()
-            self._fusion.skip(now_ns)
+            for fusion in self._fusions:
+                fusion.skip(now_ns)
         self._due_ns = None
         self._advance_to(now_ns)
 
     def take_poses(self) -> list[Pose]:
-        """Remove and return the poses of the grid instants passed since the last call, oldest first."""
-        return self._fusion.take_poses()
+        """Remove and return the poses of the grid instants passed since the last call, a filter's oldest first."""
+        poses = self._fusion.take_poses()
+        for fusion in self._fusions[1:]:
+            poses += fusion.take_poses()
+        return poses
 
     # Private
 
@@ -306,6 +339,8 @@ class SensorService:
         until_ns = now_ns if end_ns is None else min(now_ns, end_ns)
         events = batch.flat(self._table.inputs)
         virtual = self._fusion.fuse(events, until_ns, self._table.fused)
+        for fusion in self._fusions[1:]:
+            fusion.fuse(events, until_ns, ())
         for handle, computation in self._table.computed:
             column = computation.take(events)
             if column is not None:
@@ -322,6 +357,14 @@ class SensorService:
 
     def _sample_now_ns(self) -> int:
         return self._device.time_map.to_sample(self._clock.now_ns())
+
+    def _follow_pose_requests(self) -> None:
+        """Have the sensors run as fast as the fastest pose request, whichever filter it is for."""
+        period_us = self.pose_sampling_period_us
+        self._table.request_inputs(_POSE, period_us)
+        if period_us is not None:
+            for fusion in self._fusions:
+                fusion.rate_mode = RateMode.of_period(period_us)
 
     def _join(self, sensor: ActiveSensor, connection: SensorEventConnection, registration: SensorRegistration) -> None:
         """Add a listener, who is not to see what was sampled for others before now."""
