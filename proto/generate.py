@@ -1,4 +1,4 @@
-"""Make everything that follows from the .proto files: *_pb2.py, *_pb2.pyi and interface_hashes.py beside them, WIRE.md.
+"""Make everything that follows from the .proto files: *_pb2.py, *_pb2.pyi and interfaces.py beside them, WIRE.md.
 
 Run it after every edit of a .proto: `python proto/generate.py`.
 """
@@ -14,7 +14,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from google.protobuf.descriptor import FileDescriptor
 from google.protobuf.descriptor_pb2 import (
     DescriptorProto,
     EnumDescriptorProto,
@@ -22,6 +21,8 @@ from google.protobuf.descriptor_pb2 import (
     FileDescriptorProto,
     FileDescriptorSet,
 )
+from google.protobuf.message import Message
+from google.protobuf.unknown_fields import UnknownFieldSet
 
 ROOT = Path(__file__).resolve().parent
 PROTOS = ROOT / "posed" / "proto"
@@ -40,7 +41,7 @@ def main() -> None:
     files = compile_protos()
     # Only now: what is imported must be what has just been made.
     sys.path.insert(0, str(ROOT))
-    (PROTOS / "interface_hashes.py").write_text("\n".join(interface_hashes(files)) + "\n", encoding="utf-8")
+    (PROTOS / "interfaces.py").write_text("\n".join(interfaces(files)) + "\n", encoding="utf-8")
     (ROOT / "WIRE.md").write_text("\n".join(wire(files)) + "\n", encoding="utf-8")
 
 
@@ -50,36 +51,76 @@ def compile_protos() -> list[FileDescriptorProto]:
         stale.unlink()
     names = sorted(str(path.relative_to(ROOT)) for path in PROTOS.glob("*.proto"))
     with tempfile.TemporaryDirectory() as directory:
-        descriptors = Path(directory) / "descriptors"
-        outputs = ["--python_out=.", "--pyi_out=.", f"--descriptor_set_out={descriptors}", "--include_source_info"]
-        command = [sys.executable, "-m", "grpc_tools.protoc", "-I.", *outputs, *names]
-        if subprocess.run(command, cwd=ROOT).returncode != 0:
-            sys.exit("protoc failed, see above")
-        files = FileDescriptorSet.FromString(descriptors.read_bytes()).file
+        written, plain = Path(directory) / "written", Path(directory) / "plain"
+        _protoc("-I.", f"--descriptor_set_out={written}", "--include_source_info", *names)
+        files = FileDescriptorSet.FromString(written.read_bytes()).file
+        plain.write_bytes(FileDescriptorSet(file=map(_without_our_options, files)).SerializeToString())
+        _protoc(f"--descriptor_set_in={plain}", "--python_out=.", "--pyi_out=.", *names)
     by_stem = {Path(file.name).stem: file for file in files}
     return [*(by_stem.pop(stem) for stem in _READING_ORDER), *by_stem.values()]
 
 
-def interface_hashes(files: list[FileDescriptorProto]) -> Iterator[str]:
-    """Yield the lines of interface_hashes.py, as aidl_api/<interface>/<version>/.hash keeps them for AIDL."""
-    yield '"""SHA-256 of the serialised descriptors behind each interface. Made by `python proto/generate.py`.'
-    yield ""
-    yield "Kept, not computed at run time: hashlib loads OpenSSL, 3.5 MB of every process that makes a call."
-    yield '"""\n'
-    yield "HASHES = {"
+def _protoc(*arguments: str) -> None:
+    if subprocess.run([sys.executable, "-m", "grpc_tools.protoc", *arguments], cwd=ROOT).returncode != 0:
+        sys.exit("protoc failed, see above")
+
+
+def _without_our_options(file: FileDescriptorProto) -> FileDescriptorProto:
+    """Return a file without what interfaces.py says in its place, and without the import that goes with it."""
+    plain = _bare(file)
+    del plain.extension[:]
+    plain.dependency[:] = [name for name in file.dependency if name != "google/protobuf/descriptor.proto"]
+    for service in plain.service:
+        service.ClearField("options")
+        for method in service.method:
+            method.ClearField("options")
+    return plain
+
+
+def interfaces(files: list[FileDescriptorProto]) -> Iterator[str]:
+    """Yield the lines of interfaces.py; its hashes are what aidl_api/<interface>/<version>/.hash is for AIDL."""
+    numbers = {extension.name: extension.number for file in files for extension in file.extension}
+    versions, hashes, oneway = [], [], []
     for file in files:
-        behind = {each.name: each.serialized_pb for each in _behind(_module(file).DESCRIPTOR)}
+        behind = {each.name: _bare(each).SerializeToString() for each in _behind(file, files)}
         digest = hashlib.sha256(b"".join(behind[name] for name in sorted(behind))).hexdigest()
         for service in file.service:
-            yield f'    "{file.package}.{service.name}": "{digest}",'
-    yield "}"
+            name = f"{file.package}.{service.name}"
+            versions.append(f'    "{name}": {_option(service.options, numbers["interface_version"])},')
+            hashes.append(f'    "{name}": "{digest}",')
+            marked = [method for method in service.method if _option(method.options, numbers["oneway"])]
+            oneway += [f'    "{name}.{method.name}",' for method in marked]
+    yield '"""What the .proto files say of each interface. Made by `python proto/generate.py`.'
+    yield ""
+    yield "Kept, not found out at run time: hashlib loads OpenSSL, 3.5 MB of every process that makes a call; and who"
+    yield 'reads the options needs the descriptor of descriptors, half a megabyte.\n"""\n'
+    yield from ("VERSIONS = {", *versions, "}\n")
+    yield from ("HASHES = {", *hashes, "}")
+    yield '"""SHA-256 of the serialised descriptors behind each interface."""\n'
+    yield from ("ONEWAY = {", *oneway, "}")
 
 
-def _behind(file: FileDescriptor) -> Iterator[FileDescriptor]:
-    if file.name.startswith("posed/"):
-        yield file
-        for dependency in file.dependencies:
-            yield from _behind(dependency)
+def _option(options: Message, number: int) -> Any:
+    """Return what one of our options says, which nothing has been made to know; 0 where it is not given."""
+    fields = UnknownFieldSet(options)
+    return next((fields[i].data for i in range(len(fields)) if fields[i].field_number == number), 0)
+
+
+def _bare(file: FileDescriptorProto) -> FileDescriptorProto:
+    """Return a file as generated code holds it: without what stands in comments, or follows from the names."""
+    bare = FileDescriptorProto()
+    bare.CopyFrom(file)
+    bare.ClearField("source_code_info")
+    for field in (*bare.extension, *(field for message in bare.message_type for field in message.field)):
+        field.ClearField("json_name")
+    return bare
+
+
+def _behind(file: FileDescriptorProto, files: list[FileDescriptorProto]) -> Iterator[FileDescriptorProto]:
+    yield file
+    for other in files:
+        if other.name in file.dependency:
+            yield from _behind(other, files)
 
 
 def _module(file: FileDescriptorProto) -> Any:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -30,14 +31,14 @@ def generate(proto: Path) -> subprocess.CompletedProcess[str]:
 
 def generated(proto: Path) -> dict[str, bytes]:
     made = proto / "posed" / "proto"
-    files = [*made.glob("*_pb2.py*"), made / "interface_hashes.py", proto / "WIRE.md"]
+    files = [*made.glob("*_pb2.py*"), made / "interfaces.py", proto / "WIRE.md"]
     return {file.name: file.read_bytes() for file in files}
 
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """The proto directory without what is generated."""
-    ignore = shutil.ignore_patterns("__pycache__", "*_pb2.py*", "interface_hashes.py", "WIRE.md")
+    ignore = shutil.ignore_patterns("__pycache__", "*_pb2.py*", "interfaces.py", "WIRE.md")
     return Path(shutil.copytree(PROTO, tmp_path / "proto", ignore=ignore))
 
 
@@ -48,6 +49,19 @@ def test_committed_files_are_a_fresh_generation(copy: Path) -> None:
     assert generated(copy) == generated(PROTO)
     assert generate(copy).returncode == 0
     assert generated(copy) == generated(PROTO)
+
+
+@needs_compiler
+def test_the_hash_of_an_interface_follows_every_file_behind_it_and_no_other(copy: Path) -> None:
+    path = copy / "posed" / "proto" / "events.proto"
+    path.write_text(path.read_text() + "\n// More.\nmessage More {}\n")
+    assert generate(copy).returncode == 0
+    before, after = (runpy.run_path(str(each / "posed/proto/interfaces.py"))["HASHES"] for each in (PROTO, copy))
+    # The service manager's file does not import events.proto.
+    assert {name for name in before if before[name] == after[name]} == {
+        "posed.IServiceManager",
+        "posed.IServiceConnection",
+    }
 
 
 @needs_compiler

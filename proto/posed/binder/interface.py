@@ -3,15 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
-from google.protobuf.descriptor import MethodDescriptor, ServiceDescriptor
+from google.protobuf.descriptor import ServiceDescriptor
 from google.protobuf.message import Message
 from google.protobuf.message_factory import GetMessageClass
 
 from posed.binder.status import ExceptionCode, RemoteError
 from posed.proto import binder_pb2
-from posed.proto.interface_hashes import HASHES
+from posed.proto.interfaces import HASHES, ONEWAY, VERSIONS
 
 FIRST_CALL = 1
 """Code of the first method of every interface (IBinder.FIRST_CALL_TRANSACTION)."""
@@ -59,7 +58,7 @@ def interface_of(descriptor: ServiceDescriptor) -> Interface:
         Method(
             name=method.name,
             code=FIRST_CALL + index,
-            oneway=_option(method, binder_pb2.oneway),
+            oneway=method.full_name in ONEWAY,
             request_class=GetMessageClass(method.input_type),
             response_class=GetMessageClass(method.output_type),
         )
@@ -67,7 +66,7 @@ def interface_of(descriptor: ServiceDescriptor) -> Interface:
     ]
     return Interface(
         name=descriptor.full_name,
-        version=_option(descriptor, binder_pb2.interface_version),
+        version=VERSIONS[descriptor.full_name],
         hash=HASHES[descriptor.full_name],
         methods_by_name={method.name: method for method in methods},
         methods_by_code={method.code: method for method in methods},
@@ -97,8 +96,3 @@ def check_version(ours: Interface, theirs: binder_pb2.InterfaceInfo) -> None:
             f"client and daemon both speak version {ours.version} of {ours.name} but not the same one "
             f"(client {theirs.hash[:12] or 'none'}, daemon {ours.hash[:12]}); install the same posed on both sides",
         )
-
-
-def _option(descriptor: MethodDescriptor | ServiceDescriptor, extension: Any) -> Any:
-    # The generated .pyi names extensions plain FieldDescriptors, which the typed Extensions do not take.
-    return descriptor.GetOptions().Extensions[extension]

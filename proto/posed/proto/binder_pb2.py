@@ -22,26 +22,25 @@ _runtime_version.ValidateProtobufRuntimeVersion(
 _sym_db = _symbol_database.Default()
 
 
-from google.protobuf import descriptor_pb2 as google_dot_protobuf_dot_descriptor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18posed/proto/binder.proto\x12\x05posed\x1a google/protobuf/descriptor.proto\"Z\n\x06Parcel\x12)\n\x0btransaction\x18\x01 \x01(\x0b\x32\x12.posed.TransactionH\x00\x12\x1d\n\x05reply\x18\x02 \x01(\x0b\x32\x0c.posed.ReplyH\x00\x42\x06\n\x04kind\"M\n\x0bTransaction\x12\x0f\n\x07\x63\x61ll_id\x18\x01 \x01(\r\x12\x0e\n\x06target\x18\x02 \x01(\t\x12\x0c\n\x04\x63ode\x18\x03 \x01(\r\x12\x0f\n\x07payload\x18\x04 \x01(\x0c\"H\n\x05Reply\x12\x0f\n\x07\x63\x61ll_id\x18\x01 \x01(\r\x12\x1d\n\x06status\x18\x02 \x01(\x0b\x32\r.posed.Status\x12\x0f\n\x07payload\x18\x03 \x01(\x0c\"Q\n\x06Status\x12\x16\n\x0e\x65xception_code\x18\x01 \x01(\x11\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x1e\n\x16service_specific_error\x18\x03 \x01(\x11\".\n\rInterfaceInfo\x12\x0f\n\x07version\x18\x01 \x01(\r\x12\x0c\n\x04hash\x18\x02 \x01(\t\"\x07\n\x05\x45mpty:0\n\x06oneway\x12\x1e.google.protobuf.MethodOptions\x18\xd1\x86\x03 \x01(\x08:<\n\x11interface_version\x12\x1f.google.protobuf.ServiceOptions\x18\xd1\x86\x03 \x01(\rb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x18posed/proto/binder.proto\x12\x05posed\"Z\n\x06Parcel\x12)\n\x0btransaction\x18\x01 \x01(\x0b\x32\x12.posed.TransactionH\x00\x12\x1d\n\x05reply\x18\x02 \x01(\x0b\x32\x0c.posed.ReplyH\x00\x42\x06\n\x04kind\"M\n\x0bTransaction\x12\x0f\n\x07\x63\x61ll_id\x18\x01 \x01(\r\x12\x0e\n\x06target\x18\x02 \x01(\t\x12\x0c\n\x04\x63ode\x18\x03 \x01(\r\x12\x0f\n\x07payload\x18\x04 \x01(\x0c\"H\n\x05Reply\x12\x0f\n\x07\x63\x61ll_id\x18\x01 \x01(\r\x12\x1d\n\x06status\x18\x02 \x01(\x0b\x32\r.posed.Status\x12\x0f\n\x07payload\x18\x03 \x01(\x0c\"Q\n\x06Status\x12\x16\n\x0e\x65xception_code\x18\x01 \x01(\x11\x12\x0f\n\x07message\x18\x02 \x01(\t\x12\x1e\n\x16service_specific_error\x18\x03 \x01(\x11\".\n\rInterfaceInfo\x12\x0f\n\x07version\x18\x01 \x01(\r\x12\x0c\n\x04hash\x18\x02 \x01(\t\"\x07\n\x05\x45mptyb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'posed.proto.binder_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_PARCEL']._serialized_start=69
-  _globals['_PARCEL']._serialized_end=159
-  _globals['_TRANSACTION']._serialized_start=161
-  _globals['_TRANSACTION']._serialized_end=238
-  _globals['_REPLY']._serialized_start=240
-  _globals['_REPLY']._serialized_end=312
-  _globals['_STATUS']._serialized_start=314
-  _globals['_STATUS']._serialized_end=395
-  _globals['_INTERFACEINFO']._serialized_start=397
-  _globals['_INTERFACEINFO']._serialized_end=443
-  _globals['_EMPTY']._serialized_start=445
-  _globals['_EMPTY']._serialized_end=452
+  _globals['_PARCEL']._serialized_start=35
+  _globals['_PARCEL']._serialized_end=125
+  _globals['_TRANSACTION']._serialized_start=127
+  _globals['_TRANSACTION']._serialized_end=204
+  _globals['_REPLY']._serialized_start=206
+  _globals['_REPLY']._serialized_end=278
+  _globals['_STATUS']._serialized_start=280
+  _globals['_STATUS']._serialized_end=361
+  _globals['_INTERFACEINFO']._serialized_start=363
+  _globals['_INTERFACEINFO']._serialized_end=409
+  _globals['_EMPTY']._serialized_start=411
+  _globals['_EMPTY']._serialized_end=418
 # @@protoc_insertion_point(module_scope)

@@ -1,14 +1,9 @@
-from google.protobuf import descriptor_pb2 as _descriptor_pb2
 from google.protobuf import descriptor as _descriptor
 from google.protobuf import message as _message
 from collections.abc import Mapping as _Mapping
 from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 
 DESCRIPTOR: _descriptor.FileDescriptor
-ONEWAY_FIELD_NUMBER: _ClassVar[int]
-oneway: _descriptor.FieldDescriptor
-INTERFACE_VERSION_FIELD_NUMBER: _ClassVar[int]
-interface_version: _descriptor.FieldDescriptor
 
 class Parcel(_message.Message):
     __slots__ = ("transaction", "reply")

@@ -25,19 +25,13 @@ _sym_db = _symbol_database.Default()
 from posed.proto import binder_pb2 as posed_dot_proto_dot_binder__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!posed/proto/service_manager.proto\x12\x05posed\x1a\x18posed/proto/binder.proto\"J\n\x11GetServiceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\'\n\tinterface\x18\x02 \x01(\x0b\x32\x14.posed.InterfaceInfo\"G\n\x0bServiceInfo\x12\'\n\tinterface\x18\x01 \x01(\x0b\x32\x14.posed.InterfaceInfo\x12\x0f\n\x07\x62oot_id\x18\x02 \x01(\x0c\"u\n\x0b\x42indRequest\x12\x13\n\x0b\x61uto_create\x18\x01 \x01(\x08\x12\x12\n\nconnection\x18\x02 \x01(\t\x12\x14\n\x0cpackage_name\x18\x03 \x01(\t\x12\x12\n\ntarget_sdk\x18\x04 \x01(\x05\x12\x13\n\x0bpermissions\x18\x05 \x03(\t\"\x1c\n\x0bStopRequest\x12\r\n\x05\x66orce\x18\x01 \x01(\x08\"4\n\tStopReply\x12\x10\n\x08stopping\x18\x01 \x01(\x08\x12\x15\n\rbound_clients\x18\x02 \x01(\r\"\x1d\n\x0b\x42indingDied\x12\x0e\n\x06reason\x18\x01 \x01(\t\"\xbf\x01\n\rServiceStatus\x12\x0f\n\x07\x62oot_id\x18\x01 \x01(\x0c\x12\x0b\n\x03pid\x18\x02 \x01(\r\x12\x11\n\tuptime_ns\x18\x03 \x01(\x04\x12\x0f\n\x07started\x18\x04 \x01(\x08\x12\x15\n\rbound_clients\x18\x05 \x01(\r\x12\x13\n\x0b\x63onnections\x18\x06 \x01(\r\x12\x0e\n\x06source\x18\x07 \x01(\t\x12\x0f\n\x07profile\x18\x08 \x01(\t\x12\x0e\n\x06\x66ilter\x18\t \x01(\t\x12\x0f\n\x07version\x18\n \x01(\t2\xc3\x02\n\x0fIServiceManager\x12:\n\ngetService\x12\x18.posed.GetServiceRequest\x1a\x12.posed.ServiceInfo\x12/\n\x0b\x62indService\x12\x12.posed.BindRequest\x1a\x0c.posed.Empty\x12+\n\runbindService\x12\x0c.posed.Empty\x1a\x0c.posed.Empty\x12*\n\x0cstartService\x12\x0c.posed.Empty\x1a\x0c.posed.Empty\x12\x33\n\x0bstopService\x12\x12.posed.StopRequest\x1a\x10.posed.StopReply\x12/\n\tgetStatus\x12\x0c.posed.Empty\x1a\x14.posed.ServiceStatus\x1a\x04\x88\xb5\x18\x02\x32S\n\x12IServiceConnection\x12\x37\n\ronBindingDied\x12\x12.posed.BindingDied\x1a\x0c.posed.Empty\"\x04\x88\xb5\x18\x01\x1a\x04\x88\xb5\x18\x02\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!posed/proto/service_manager.proto\x12\x05posed\x1a\x18posed/proto/binder.proto\"J\n\x11GetServiceRequest\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\'\n\tinterface\x18\x02 \x01(\x0b\x32\x14.posed.InterfaceInfo\"G\n\x0bServiceInfo\x12\'\n\tinterface\x18\x01 \x01(\x0b\x32\x14.posed.InterfaceInfo\x12\x0f\n\x07\x62oot_id\x18\x02 \x01(\x0c\"u\n\x0b\x42indRequest\x12\x13\n\x0b\x61uto_create\x18\x01 \x01(\x08\x12\x12\n\nconnection\x18\x02 \x01(\t\x12\x14\n\x0cpackage_name\x18\x03 \x01(\t\x12\x12\n\ntarget_sdk\x18\x04 \x01(\x05\x12\x13\n\x0bpermissions\x18\x05 \x03(\t\"\x1c\n\x0bStopRequest\x12\r\n\x05\x66orce\x18\x01 \x01(\x08\"4\n\tStopReply\x12\x10\n\x08stopping\x18\x01 \x01(\x08\x12\x15\n\rbound_clients\x18\x02 \x01(\r\"\x1d\n\x0b\x42indingDied\x12\x0e\n\x06reason\x18\x01 \x01(\t\"\xbf\x01\n\rServiceStatus\x12\x0f\n\x07\x62oot_id\x18\x01 \x01(\x0c\x12\x0b\n\x03pid\x18\x02 \x01(\r\x12\x11\n\tuptime_ns\x18\x03 \x01(\x04\x12\x0f\n\x07started\x18\x04 \x01(\x08\x12\x15\n\rbound_clients\x18\x05 \x01(\r\x12\x13\n\x0b\x63onnections\x18\x06 \x01(\r\x12\x0e\n\x06source\x18\x07 \x01(\t\x12\x0f\n\x07profile\x18\x08 \x01(\t\x12\x0e\n\x06\x66ilter\x18\t \x01(\t\x12\x0f\n\x07version\x18\n \x01(\t2\xbd\x02\n\x0fIServiceManager\x12:\n\ngetService\x12\x18.posed.GetServiceRequest\x1a\x12.posed.ServiceInfo\x12/\n\x0b\x62indService\x12\x12.posed.BindRequest\x1a\x0c.posed.Empty\x12+\n\runbindService\x12\x0c.posed.Empty\x1a\x0c.posed.Empty\x12*\n\x0cstartService\x12\x0c.posed.Empty\x1a\x0c.posed.Empty\x12\x33\n\x0bstopService\x12\x12.posed.StopRequest\x1a\x10.posed.StopReply\x12/\n\tgetStatus\x12\x0c.posed.Empty\x1a\x14.posed.ServiceStatus2G\n\x12IServiceConnection\x12\x31\n\ronBindingDied\x12\x12.posed.BindingDied\x1a\x0c.posed.Emptyb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'posed.proto.service_manager_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_ISERVICEMANAGER']._loaded_options = None
-  _globals['_ISERVICEMANAGER']._serialized_options = b'\210\265\030\002'
-  _globals['_ISERVICECONNECTION']._loaded_options = None
-  _globals['_ISERVICECONNECTION']._serialized_options = b'\210\265\030\002'
-  _globals['_ISERVICECONNECTION'].methods_by_name['onBindingDied']._loaded_options = None
-  _globals['_ISERVICECONNECTION'].methods_by_name['onBindingDied']._serialized_options = b'\210\265\030\001'
   _globals['_GETSERVICEREQUEST']._serialized_start=70
   _globals['_GETSERVICEREQUEST']._serialized_end=144
   _globals['_SERVICEINFO']._serialized_start=146
@@ -53,7 +47,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SERVICESTATUS']._serialized_start=454
   _globals['_SERVICESTATUS']._serialized_end=645
   _globals['_ISERVICEMANAGER']._serialized_start=648
-  _globals['_ISERVICEMANAGER']._serialized_end=971
-  _globals['_ISERVICECONNECTION']._serialized_start=973
-  _globals['_ISERVICECONNECTION']._serialized_end=1056
+  _globals['_ISERVICEMANAGER']._serialized_end=965
+  _globals['_ISERVICECONNECTION']._serialized_start=967
+  _globals['_ISERVICECONNECTION']._serialized_end=1038
 # @@protoc_insertion_point(module_scope)
