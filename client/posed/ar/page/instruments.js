@@ -204,8 +204,10 @@ export class Instruments {
       const isLabelled = mark % 10 === 0;
       context.fillStyle = mark === 0 ? YELLOW : isLabelled ? WHITE : QUIET;
       context.fillRect(x, at - 0.75, isLabelled ? 10 : 6, 1.5);
-      // The value of the middle is in its own frame: a mark behind it would only blur it.
-      if (isLabelled && Math.abs(at - y) > 19) context.fillText(`${mark}`, x + PITCH_WIDTH - 6, at);
+      // The value of the middle is in its own frame: a mark behind it would only blur it. At the ends half is cut off.
+      const off = Math.abs(at - y);
+      if (!isLabelled || off < 19 || off > half - 8) continue;
+      context.fillText(`${mark}`.replace("-", "−"), x + PITCH_WIDTH - 6, at);
     }
     context.restore();
     context.fillStyle = "rgb(12, 15, 20)";
