@@ -24,6 +24,8 @@ from posed.cli.profiling.daemons import Daemon, PrivateDaemon
 from posed.cli.profiling.measurement import BATCH_LATENCY_US, Observation, observe
 from posed.cli.profiling.report import Repeated, machine
 from posed.client import SENSOR_DELAY_FASTEST, SENSOR_DELAY_NORMAL
+from posed.daemon.encoding import pose_topic
+from posed.fusion import DEFAULT_FILTER
 
 _LOAD = str(Path(__file__).with_name("load.py"))
 _RECORDING_S = 60.0
@@ -171,9 +173,10 @@ def _loop(command: list[str], directory: Path, seconds: float) -> Usage:
     zmq_context = context()
     with Workload([_LOAD, *command], os.environ) as pipeline:
         subscriber = sub(zmq_context, conflate=True)
-        subscriber.subscribe(b"pose/100000/")
+        subscriber.subscribe(pose_topic(100_000, DEFAULT_FILTER))
         subscriber.connect(endpoint(pose_path(directory)))
-        subscriber.poll()
+        if not subscriber.poll(10_000):
+            sys.exit(f"{' '.join(command)} published nothing within 10 s")
         time.sleep(1.0)
         before = pipeline.read()
         time.sleep(seconds)

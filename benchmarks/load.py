@@ -172,7 +172,9 @@ def bare(directory: Path) -> dict[str, Any]:
     from posed.binder.runtime import bind_socket, pose_path, unlink_socket
     from posed.binder.sockets import context, xpub
     from posed.clock import BootClock
+    from posed.daemon.encoding import pose_topic
     from posed.daemon.waiting import Waiter
+    from posed.fusion import DEFAULT_FILTER
 
     path = pose_path(directory)
     socket = xpub(context())
@@ -181,12 +183,13 @@ def bare(directory: Path) -> dict[str, Any]:
     begin(ended.set)
     waiter = Waiter((socket,))
     due_ns = BootClock().now_ns()
+    message = pose_topic(100_000, DEFAULT_FILTER) + bytes(150)
     sent = 0
     while not ended.is_set():
         for _ in waiter.readable():
             socket.recv()
         if not waiter.wait(due_ns):
-            socket.send(b"pose/100000/\0" + bytes(150))
+            socket.send(message)
             sent += 1
             due_ns += 100_000_000
     waiter.close()

@@ -146,7 +146,8 @@ class _Daemon:
         """Handle what the sockets have, and only those: trying one in vain costs an exception. True if calls wait."""
         if self._publisher.socket in readable:
             self._publisher.read_subscriptions()
-        if self._server.retry_s is not None or any(each in readable for each in self._server.sockets):
+            readable.remove(self._publisher.socket)
+        if readable or self._server.retry_s is not None:
             return self._server.process()
         return False
 

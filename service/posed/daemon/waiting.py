@@ -11,25 +11,24 @@ import zmq
 from posed.binder.sockets import Socket
 
 _TFD_TIMER_ABSTIME = 1
-_EVENTS = int(zmq.EVENTS)
-_POLLIN = int(zmq.POLLIN)
 
 
 class Waiter:
     """Waits on ZeroMQ sockets, other file descriptors and one timer.
 
-    zmq.Poller cuts time-outs to milliseconds, which makes every pose half a millisecond late, and costs twice as much
-    a wake-up. A timer of the kernel's is exact, and one on CLOCK_BOOTTIME is due at once after a suspend.
+    zmq.Poller cuts time-outs to milliseconds, which makes every pose half a millisecond late, and waiting by it costs
+    twice as much a wake-up. A timer of the kernel's is exact, and one on CLOCK_BOOTTIME is due at once after a suspend.
     """
 
     def __init__(self, sockets: Sequence[Socket]) -> None:
-        self._sockets = sockets
+        self._sockets = zmq.Poller()
         self._timer = _timerfd_create()
         self._armed_ns: int | None = None
         self._epoll = select.epoll()
         # Edge-triggered, a timer that went off need not be read: setting it anew starts from nothing.
         self._epoll.register(self._timer, select.EPOLLIN | select.EPOLLET)
         for each in sockets:
+            self._sockets.register(each, zmq.POLLIN)
             self.watch(each.fileno())
 
     def watch(self, fd: int) -> None:
@@ -42,7 +41,7 @@ class Waiter:
         A socket's descriptor only tells that its state has changed since it was asked or sent on: so the sockets are
         to be asked before every wait.
         """
-        return [each for each in self._sockets if int(each.getsockopt(_EVENTS)) & _POLLIN]
+        return [each for each, _ in self._sockets.poll(0)]
 
     def wait(self, deadline_ns: int | None) -> bool:
         """Sleep until something happens or `deadline_ns` (CLOCK_BOOTTIME) has come; None is no deadline.

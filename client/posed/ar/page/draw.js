@@ -7,7 +7,7 @@ export const YELLOW = "#ffd400";
 export const WHITE = "#ffffff";
 export const QUIET = "#c9d1dc";
 export const DARK = "#14080a";
-export const PLATE = "rgba(12, 15, 20, 0.74)";
+export const PLATE = "rgba(12, 15, 20, 0.86)";
 const HALO = "rgba(0, 0, 0, 0.62)";
 
 const FAMILY = 'system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "DejaVu Sans", sans-serif';
