@@ -235,6 +235,9 @@ class _Stream:
     def __init__(self, kind: SensorType, recorded: EventColumn, part: SensorProfile, anchor_ns: int) -> None:
         self._is_gyroscope = kind in (SensorType.GYROSCOPE, SensorType.GYROSCOPE_UNCALIBRATED)
         self._recorded = recorded
+        # Of a single sample there is nothing to thin.
+        gaps_ns = np.diff(recorded.timestamp_ns)
+        self._recorded_hz = 1e9 / float(np.median(gaps_ns)) if len(gaps_ns) else 0.0
         self._part = part
         self._anchor_ns = anchor_ns
         self._rate_hz = 0.0
@@ -291,11 +294,8 @@ class _Stream:
         self.times = column.timestamp_ns.data
 
     def _thinned(self, rate_hz: float) -> EventColumn:
-        if len(self._recorded) < 2:
-            return self._recorded
-        recorded_hz = 1e9 / float(np.median(np.diff(self._recorded.timestamp_ns)))
         # A stamp rounded to nanoseconds makes 15 Hz a little more than 15 Hz; that must not thin it.
-        if rate_hz > 0.99 * recorded_hz:
+        if rate_hz > 0.99 * self._recorded_hz:
             return self._recorded
         thin = thin_by_mean if self._is_gyroscope else thin_by_nearest
         return thin(self._recorded, rate_hz, self._anchor_ns)
