@@ -7,6 +7,7 @@ object.__setattr__ and costs the daemon a tenth of its time. None of it is chang
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
+from itertools import repeat
 from operator import itemgetter
 
 import numpy as np
@@ -202,13 +203,8 @@ class EventBatch:
         events: list[FlatEvent] = []
         for handle in sorted(self.columns.keys() & sensor_types.keys()):
             column = self.columns[handle]
-            kind = int(sensor_types[handle])
-            events += [
-                (kind, timestamp_ns, x, y, z)
-                for timestamp_ns, (x, y, z) in zip(
-                    column.timestamp_ns.tolist(), column.values[:, :3].tolist(), strict=True
-                )
-            ]
+            x, y, z = column.values[:, :3].T.tolist()
+            events += zip(repeat(int(sensor_types[handle])), column.timestamp_ns.tolist(), x, y, z)
         events.sort(key=_time_of)
         return events
 

@@ -120,10 +120,10 @@ class _Daemon:
                     if self._clock.now_ns() >= wait_for_bind_ns:
                         break
                     deadline_ns = min(deadline_ns or wait_for_bind_ns, wait_for_bind_ns)
-                retries_s = [each for each in (self._server.retry_s, self._sensors.retry_s) if each is not None]
-                if retries_s:
-                    retry_ns = self._clock.now_ns() + int(min(retries_s) * 1e9)
-                    deadline_ns = min(deadline_ns or retry_ns, retry_ns)
+                for retry_s in (self._server.retry_s, self._sensors.retry_s):
+                    if retry_s is not None:
+                        retry_ns = self._clock.now_ns() + int(retry_s * 1e9)
+                        deadline_ns = min(deadline_ns or retry_ns, retry_ns)
                 readable = self._waiter.readable()
                 idle = not (calls_wait or readable or self._lifecycle.over)
                 if idle:

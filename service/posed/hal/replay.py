@@ -147,9 +147,13 @@ class ReplaySource:
         flushed, self._flushes = self._flushes, []
         columns: dict[int, EventColumn] = {}
         if self._active and until_ns > self._drained_ns:
-            shift_ns = self._shift_ns(until_ns)
+            first_ns, last_ns = self._shift_ns(self._drained_ns), self._shift_ns(until_ns)
             for handle, stream in self._active.items():
-                column = self._between(stream, max(self._drained_ns, stream.since_ns), until_ns, shift_ns)
+                after_ns = max(self._drained_ns, stream.since_ns)
+                if first_ns == last_ns:
+                    column = stream.rows(after_ns, until_ns, last_ns)
+                else:
+                    column = self._over_passes(stream, after_ns, until_ns)
                 if len(column.timestamp_ns):
                     columns[handle] = column
             self._drained_ns = until_ns
@@ -217,14 +221,10 @@ class ReplaySource:
             return 0
         return max(0, (sample_ns - self._recording.start_ns) // self._pass_ns) * self._pass_ns
 
-    def _between(self, stream: "_Stream", after_ns: int, until_ns: int, last_ns: int) -> EventColumn:
-        """Return a stream's rows; last_ns: the shift of `until_ns`."""
-        first_ns = self._shift_ns(after_ns)
-        if first_ns == last_ns:
-            return stream.rows(after_ns, until_ns, first_ns)
+    def _over_passes(self, stream: "_Stream", after_ns: int, until_ns: int) -> EventColumn:
         passes = [
             stream.rows(max(after_ns, shift_ns + self._recording.start_ns - 1), until_ns, shift_ns)
-            for shift_ns in range(first_ns, last_ns + 1, self._pass_ns)
+            for shift_ns in range(self._shift_ns(after_ns), self._shift_ns(until_ns) + 1, self._pass_ns)
         ]
         return EventColumn.concatenate(passes)
 

@@ -202,7 +202,7 @@ class PoseFusion:
             )
         grid.occurred = FilterStatus.OK
         grid.events_before = self.events_fused
-        grid.next_index += 1
+        grid.move_to(grid.next_index + 1)
 
 
 _instant_of = itemgetter(0)

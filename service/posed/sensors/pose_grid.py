@@ -1,6 +1,6 @@
 """The instants on which the poses of one period stand."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from posed.events import FilterStatus
 
@@ -17,11 +17,17 @@ class PoseGrid:
     occurred: FilterStatus = FilterStatus.OK
     """What happened in the filter since the last instant."""
 
-    @property
-    def next_ns(self) -> int:
-        """The next instant."""
-        return self.anchor_ns + self.next_index * self.period_us * 1000
+    next_ns: int = field(init=False)
+    """The next instant, that of next_index."""
+
+    def __post_init__(self) -> None:
+        self.move_to(self.next_index)
+
+    def move_to(self, index: int) -> None:
+        """Have the instant of this index be the next."""
+        self.next_index = index
+        self.next_ns = self.anchor_ns + index * self.period_us * 1000
 
     def skip(self, now_ns: int) -> None:
         """Pass over the instants up to `now_ns`."""
-        self.next_index = max(self.next_index, (now_ns - self.anchor_ns) // (self.period_us * 1000) + 1)
+        self.move_to(max(self.next_index, (now_ns - self.anchor_ns) // (self.period_us * 1000) + 1))

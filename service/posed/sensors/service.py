@@ -287,7 +287,8 @@ class SensorService:
         end_ns = device.end_ns
         due: list[int] = []
         for fusion in self._fusions:
-            due += [t for t in fusion.next_instants_ns() if end_ns is None or t <= end_ns]
+            instants = fusion.next_instants_ns()
+            due += instants if end_ns is None else [t for t in instants if t <= end_ns]
             if fusion.awaits_first_sample:
                 due += [t for t in map(device.next_sample_ns, self._table.inputs) if t is not None]
         for sensor in self._table.active:
