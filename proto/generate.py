@@ -334,12 +334,10 @@ bytes libzmq closes the connection without a word. A message of several frames (
 [TruthMessage](#truthmessage). Subscribe with topic and \
 zero byte exactly as [PoseRegistration](#poseregistration) gives them. The daemon's queue for a subscriber holds 10 \
 messages; what finds it full is dropped, and the sequence numbers show it.
-- Heartbeats: the daemon sends ZMTP pings every 900 ms, time to live 1,500 ms (on a pose socket every 3,000 ms, time \
-to live 4,500 ms), and drops a connection that does not answer for 1,000 ms. libzmq answers by itself unless its \
-receive queue is full: a client that stops reading is cut off too. It also drops the connection to a daemon that says \
-nothing for the time to live after a ping; a client need only ping for the time before the first one (on the control \
-socket HEARTBEAT_IVL 3000 and HEARTBEAT_TIMEOUT 1000). Set a receive high-water mark of 1,000 (never 0) and \
-RECONNECT_IVL 100, RECONNECT_IVL_MAX 500. A connection must finish its handshake within 500 ms.
+- Heartbeats: on the control socket both sides send ZMTP pings every 900 ms, on the pose socket the daemon does every \
+3,000 ms; who does not answer for 1,000 ms is cut off. libzmq answers by itself unless its receive queue is full: a \
+client that stops reading is cut off too. Set HEARTBEAT_IVL and HEARTBEAT_TIMEOUT, a receive high-water mark of 1,000 \
+(never 0) and RECONNECT_IVL 100, RECONNECT_IVL_MAX 500. A connection must finish its handshake within 500 ms.
 - Whatever the daemon knows of a client (services it got, bindings, listeners) ends with its connection. After a \
 reconnect begin again with getService.
 

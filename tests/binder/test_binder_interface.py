@@ -103,10 +103,9 @@ def test_every_socket_is_bounded_in_queue_size_and_patience(context: sockets.Con
         assert socket.getsockopt(zmq.RECONNECT_IVL) == 100
         assert socket.getsockopt(zmq.RECONNECT_IVL_MAX) == 500
     heartbeats = [
-        [made_one.getsockopt(each) for each in (zmq.HEARTBEAT_IVL, zmq.HEARTBEAT_TIMEOUT, zmq.HEARTBEAT_TTL)]
-        for made_one in made[:3]
+        [made_one.getsockopt(each) for each in (zmq.HEARTBEAT_IVL, zmq.HEARTBEAT_TIMEOUT)] for made_one in made[:3]
     ]
-    assert heartbeats == [[900, 1000, 1500], [3000, 1000, 0], [3000, 1000, 4500]]
+    assert heartbeats == [[900, 1000], [900, 1000], [3000, 1000]]
     assert context.get(zmq.IO_THREADS) == 1
     for socket in made:
         socket.close()

@@ -76,6 +76,8 @@ def test_nothing_that_can_be_read(trial: Path, capsys: pytest.CaptureFixture[str
     said = capsys.readouterr()
     assert said.out == ""
     assert "is empty" in said.err
+    assert main(["evaluate", str(trial), "--json", str(trial.with_name("none.json"))]) == 65
+    assert not trial.with_name("none.json").exists()
     assert "1 of 1 trials skipped, 0 evaluated" in said.err
 
 
@@ -86,6 +88,7 @@ def test_nothing_that_can_be_read(trial: Path, capsys: pytest.CaptureFixture[str
         (["TRIAL", "--filters=best"], "posed: error: no filter is named 'best'; choose one of"),
         (["TRIAL", "--filters=dcm,dcm"], "none twice"),
         (["TRIAL", "--modes=GAME", "--json=/nowhere/x.json"], "posed: error: cannot write /nowhere/x.json"),
+        (["TRIAL", "--filters=phone"], "posed: error: no trial has what phone needs"),
     ],
 )
 def test_mistakes_are_one_line(trial: Path, options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -192,3 +192,17 @@ def test_names_are_escaped_in_the_reports() -> None:
     assert "<script>" not in as_html(odd)
     assert "<i>" not in as_html(odd)
     assert r"<b>\|x" in as_markdown(odd)
+
+
+def test_a_trial_may_be_called_what_it_likes() -> None:
+    pytest.importorskip("matplotlib")
+    names = ("$body", "$notes", "NOTES", "$")
+    odd = Evaluation(Plan(("dcm",)), tuple(_result(name, "dcm", 1.0) for name in names), ())
+    page = as_html(odd)
+    assert all(f">{name}</td>" in page for name in names)
+    assert page.count("<ul>") == 1
+
+
+def test_a_difference_that_is_not_known_is_a_dash() -> None:
+    results = (_result("a", "dcm", 1.0), _result("a", "vqf", math.nan))
+    assert "nan" not in as_markdown(Evaluation(Plan(("dcm", "vqf")), results, ()))

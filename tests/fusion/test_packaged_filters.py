@@ -1,6 +1,7 @@
 """Filters of other packages behind the one protocol."""
 
 import json
+import math
 import sys
 from importlib import import_module
 from itertools import pairwise
@@ -111,6 +112,8 @@ def test_vqf_continues_from_what_was_saved(swung: FlatEvents, seconds: float) ->
         lambda saved: saved | {"vqf": {"gyrQuat": 3}},
         lambda saved: saved | {"state": None},
         lambda saved: saved | {"state": saved["state"] | {"held": 1}},
+        lambda saved: saved | {"state": saved["state"] | {"held": [1]}},
+        lambda saved: saved | {"state": saved["state"] | {"rate": [1.0]}},
         lambda saved: saved | {"state": {"held": []}},
     ],
 )
@@ -195,6 +198,19 @@ def test_bad_samples_are_flagged_and_left_out(name: str, swung: FlatEvents) -> N
     one.update_batch([*spoilt, (8, events[-1][1] + 1, 1.0, 0.0, 0.0)])
     assert answer(one).status & FilterStatus.BAD_SAMPLE
     assert answer(one).quaternion == answer(clean).quaternion
+
+
+def test_vqf_is_restored_in_one_process_after_a_bad_sample() -> None:
+    one, other = made("vqf"), made("vqf")
+    one.update(SensorType.GYROSCOPE, 1, math.nan, 0.0, 0.0)
+    other.restore(one.save())
+    assert other.save() == one.save()
+
+
+def test_vqf_holds_no_more_than_it_must_without_a_gyroscope() -> None:
+    one = made("vqf")
+    one.update_batch((int(SensorType.ACCELEROMETER), k * 10_000_000, 0.0, 0.0, 9.81) for k in range(30_000))
+    assert len(one.save()["state"]["held"]) <= 10_000
 
 
 def test_vqf_tells_of_rest_and_disturbance() -> None:

@@ -114,13 +114,32 @@ def test_filters_side_by_side_get_the_same_events_and_give_what_each_gives_alone
     assert both["dcm"][-1].orientation != both["dcm-adaptive"][-1].orientation
 
 
+def test_who_asks_late_for_a_filter_beside_finds_it_as_old_as_the_first() -> None:
+    profile = load_profile("patonis2018")
+
+    def last_of_dcm(asked_at_s: int) -> Pose:
+        clock = VirtualClock(1_000_000_000)
+        first, beside = (make_device_filter(name, profile) for name in ("dcm-adaptive", "dcm"))
+        service = SensorService(open_source("sim:look-around", profile, clock), first, clock, beside=[beside])
+        service.register_pose("first", 100_000, 0)
+        for second in range(20):
+            if second == asked_at_s:
+                service.register_pose("late", 100_000, 0, "dcm")
+            clock.advance_to(clock.now_ns() + 1_000_000_000)
+            service.advance()
+            poses = service.take_poses()
+        return next(pose for pose in reversed(poses) if pose.filter_name == "dcm")
+
+    assert last_of_dcm(asked_at_s=19) == last_of_dcm(asked_at_s=0)
+
+
 def test_a_pose_stream_can_move_to_another_filter_and_only_to_one_that_runs() -> None:
     profile = load_profile("patonis2018")
     clock = VirtualClock(1_000_000_000)
     filters = [make_device_filter(name, profile) for name in ("dcm-adaptive", "dcm")]
     service = SensorService(open_source("sim:still", profile, clock), filters[0], clock, beside=filters[1:])
     service.register_pose("a", 100_000, 0)
-    with pytest.raises(InvalidArgumentError, match=r"'vqf' does not run here.*--filter dcm-adaptive,dcm,vqf"):
+    with pytest.raises(InvalidArgumentError, match=r"'vqf' does not run here, only dcm-adaptive, dcm; name it"):
         service.register_pose("a", 100_000, 0, "vqf")
     for name in ("dcm-adaptive", "dcm"):
         service.register_pose("a", 100_000, 0, name)

@@ -97,6 +97,9 @@ def run(arguments: argparse.Namespace) -> int:
         count = len(evaluation.skipped)
         print(f"posed: {count} of {len(trials)} trials skipped, {len(trials) - count} evaluated", file=sys.stderr)
         return EX_DATAERR
+    if not evaluation.results:
+        names = ", ".join(plan.filters)
+        raise InvalidArgumentError(f"no trial has what {names} needs: there is nothing to show; name another filter")
     return 0
 
 
@@ -132,9 +135,12 @@ def _write(evaluation: Evaluation, arguments: argparse.Namespace) -> None:
 
 def _require_writable(path: Path) -> None:
     """Raise InvalidArgumentError now, not after minutes of work."""
+    is_new = not path.exists()
     try:
         with path.open("a"):
             pass
+        if is_new:
+            path.unlink()
     except OSError as error:
         raise InvalidArgumentError(f"cannot write {path}: {error.strerror}; name a file that can be written") from error
 

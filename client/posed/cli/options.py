@@ -141,7 +141,7 @@ def _pose_rate(text: str) -> float:
 
 
 def _filters(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
+    names = tuple(name.strip() for name in text.split(","))
     if len(set(names)) != len(names):
         raise argparse.ArgumentTypeError(f"{text!r} names a filter twice")
     return names

@@ -202,7 +202,7 @@ class PoseClient:
             return
         self._close_sockets()
         self._topic = registration.pose_topic
-        # Sequences of another period count something else.
+        # Sequences of another period count something else, and poses of another filter are no successors.
         with self._arrived:
             self._waiting.clear()
             self._seen = None

@@ -47,9 +47,7 @@ def dealer(context: Context) -> Socket:
     socket = _connected(context, zmq.DEALER, high_water_mark=1000)
     socket.setsockopt(zmq.SNDHWM, 64)
     socket.setsockopt(zmq.LINGER, _FAREWELL_MS)
-    # For a daemon that stops before its first ping, which is what tells of it otherwise.
-    socket.setsockopt(zmq.HEARTBEAT_IVL, 3000)
-    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1000)
+    _heartbeat(socket, 900)
     return socket
 
 
@@ -92,20 +90,25 @@ _FAREWELL_MS = 200
 
 def _bound(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket = _socket(context, kind, high_water_mark)
-    # A stopped process answers nothing but keeps its sockets open: a stopped client is seen on the control socket after
-    # 1.0 to 1.9 s, as the ping it leaves unanswered is up to 0.9 s away. On a pose socket it only costs what is sent in
-    # vain, and pings as often would wake the daemon twice a second for each client. A client sees
-    # a stopped daemon once the time to live has passed since its last ping, and need not ping as often itself.
-    control = kind == zmq.ROUTER
-    socket.setsockopt(zmq.HEARTBEAT_IVL, 900 if control else 3000)
-    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1000)
-    socket.setsockopt(zmq.HEARTBEAT_TTL, 1500 if control else 4500)
+    # On a pose socket a stopped client only costs what is sent in vain, and as many pings as on the control socket
+    # would wake the daemon twice a second more for each client. Clients send none there: they see a stopped daemon on
+    # the other.
+    _heartbeat(socket, 900 if kind == zmq.ROUTER else 3000)
     # The mode of the directory keeps strangers out; this is the lock behind it.
     socket.setsockopt(zmq.IPC_FILTER_UID, os.getuid())
     # What does not begin as ZMTP 3 passes for ZMTP 1, which has no heartbeat: an HTTP request would keep its connection
     # for ever. A domain for ZAP, though nobody serves it, makes libzmq refuse the old versions.
     socket.setsockopt(zmq.ZAP_DOMAIN, b"posed")
     return socket
+
+
+def _heartbeat(socket: Socket, interval_ms: int) -> None:
+    """Have a stopped process seen, which answers nothing but keeps its sockets open: a second after the next ping.
+
+    Time to live would tell the other side without a ping of its own, but any message cancels it.
+    """
+    socket.setsockopt(zmq.HEARTBEAT_IVL, interval_ms)
+    socket.setsockopt(zmq.HEARTBEAT_TIMEOUT, 1000)
 
 
 def _connected(context: Context, kind: int, high_water_mark: int) -> Socket:

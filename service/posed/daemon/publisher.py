@@ -1,4 +1,4 @@
-"""The socket on which poses and truth go out, one topic a pose period."""
+"""The socket on which poses and truth go out, one topic a filter and pose period."""
 
 import logging
 from pathlib import Path

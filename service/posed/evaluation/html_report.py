@@ -3,6 +3,7 @@
 import base64
 from collections.abc import Sequence
 from html import escape
+from string import Template
 
 from posed.evaluation.evaluate import Evaluation, Result
 from posed.evaluation.plots import (
@@ -43,7 +44,7 @@ def as_html(evaluation: Evaluation) -> str:
         items = "".join(f"<li>{escape(each.reason)}</li>" for each in evaluation.skipped)
         parts.append(f"<h2>{len(evaluation.skipped)} skipped</h2><ul>{items}</ul>")
     notes = "".join(f"<li>{escape(note)}</li>" for note in NOTES)
-    return _PAGE.replace("BODY", "\n".join(parts)).replace("NOTES", notes).replace("SUBJECT", _subject(evaluation))
+    return _PAGE.substitute(body="\n".join(parts), notes=notes, subject=_subject(evaluation))
 
 
 def _subject(evaluation: Evaluation) -> str:
@@ -80,13 +81,13 @@ def _table(table: ReportTable, *, folded: bool) -> str:
     return f"<details{'' if folded else ' open'}><summary>{escape(table.title)}</summary>{grid}</details>"
 
 
-_PAGE = """\
+_PAGE = Template("""\
 <!doctype html>
 <html lang="en">
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
-<title>Orientation error: SUBJECT</title>
+<title>Orientation error: $subject</title>
 <style>
 :root { color-scheme: light dark; --ink: #222; --paper: #fff; --line: #ddd; --faint: #666 }
 @media (prefers-color-scheme: dark) { :root { --ink: #ddd; --paper: #16181c; --line: #3a3d44; --faint: #999 } }
@@ -106,9 +107,9 @@ thead th, tr.end td { border-bottom: 1px solid var(--line) }
 ul { color: var(--faint); font-size: 13px; padding-left: 1.2rem }
 </style>
 <h1>Orientation error</h1>
-<p>SUBJECT</p>
-BODY
+<p>$subject</p>
+$body
 <h2>Notes</h2>
-<ul>NOTES</ul>
+<ul>$notes</ul>
 </html>
-"""
+""")

@@ -156,11 +156,15 @@ def _summary_table(
                 degrees(each.pose10hz_mean),
                 degrees(each.pose10hz_aligned_mean),
                 "-" if each.ns_per_event is None else f"{each.ns_per_event:.0f}",
-                "" if delta is None else f"{delta.mean:+.2f} [{delta.low:+.2f}, {delta.high:+.2f}]",
+                "" if delta is None else _interval(delta),
             )
         )
     header = ("mode", "filter", "trials", "mean", "median", "heading", "incl.", "10 Hz", "aligned", "ns", f"- {first}")
     return ReportTable(f"{dataset}: means over trials", header, tuple(rows), 2, _ends(rows))
+
+
+def _interval(delta: Difference) -> str:
+    return "-" if math.isnan(delta.mean) else f"{delta.mean:+.2f} [{delta.low:+.2f}, {delta.high:+.2f}]"
 
 
 def _group_table(dataset: str, groups: Sequence[Summary]) -> ReportTable:

@@ -86,7 +86,7 @@ class ImufusionFilter(PacedFilter):
         self._bias.set_settings(imufusion.BiasSettings(sample_rate=rate_hz))
 
     def _step(self, before: Sequence[FlatEvent], rate: FlatEvent, after: Sequence[FlatEvent]) -> None:
-        # It has one step for all three sensors; a zero vector stands for a sample that there is not.
+        # It has one step for all three sensors: the last sample of each stands until the next.
         for event in (*before, *after):
             self._measure(event)
         unbiased = self._bias.update(np.degrees(np.array(rate[2:])))

@@ -28,6 +28,8 @@ UNKNOWN_BIAS = ((0.0, 0.0, 0.0), (nan, nan, nan))
 
 _LONGEST_HOLD_NS = 500_000_000
 _STRETCH_NS = 1_000_000_000
+_MOST_HELD = 10_000
+"""Events kept while the periods are not known: without a gyroscope they never are."""
 _PERIOD_TOLERANCE = 0.1
 """Share by which a period may differ from the one in use before the filter is told another."""
 
@@ -140,17 +142,18 @@ class PacedFilter(ABC):
         if kind not in (_GYROSCOPE, _ACCELEROMETER, _MAGNETIC_FIELD):
             return
         if not x * x + y * y + z * z < 1e8:
-            s.events |= FilterStatus.BAD_SAMPLE
+            s.events |= int(FilterStatus.BAD_SAMPLE)
             return
         if s.has_gyro and abs(t - s.gyro_ns) > _LONGEST_HOLD_NS and kind == _GYROSCOPE:
-            s.events |= FilterStatus.GAP
+            s.events |= int(FilterStatus.GAP)
             s.stretch = {}
             s.has_gyro = False
         if kind == _GYROSCOPE and s.has_gyro and t <= s.gyro_ns:
-            s.events |= FilterStatus.GAP
+            s.events |= int(FilterStatus.GAP)
             return
         self._count(kind, t)
         if not s.periods:
+            del s.held[: max(0, len(s.held) + 1 - _MOST_HELD)]
             s.held.append(event)
             s.has_gyro, s.gyro_ns = (True, t) if kind == _GYROSCOPE else (s.has_gyro, s.gyro_ns)
             if kind == _GYROSCOPE and self._measure_periods(t):
@@ -237,5 +240,7 @@ class PacedFilter(ABC):
         fits = isinstance(saved, Mapping) and saved.keys() == blank.keys()
         if not fits or any(type(saved[name]) is not type(value) for name, value in blank.items()):
             raise InvalidArgumentError(f"the saved state is {saved!r:.100}, which is no state of this filter")
-        held = [tuple(event) for event in saved["held"]]
-        return PacedState(**{**saved, "held": held, "rate": tuple(saved["rate"])})
+        held, rate = saved["held"], saved["rate"]
+        if len(rate) != 3 or any(not isinstance(event, (list, tuple)) or len(event) != 5 for event in held):
+            raise InvalidArgumentError(f"the saved state holds {held!r:.100} and the rate {rate!r:.100}; save it anew")
+        return PacedState(**{**saved, "held": [tuple(event) for event in held], "rate": tuple(rate)})

@@ -109,15 +109,18 @@ class PoseFusion:
             if grid is not None:
                 grid.skip(now_ns)
 
-    def fuse(self, events: list[FlatEvent], until_ns: int, wanted: Collection[SensorType]) -> dict[int, EventColumn]:
+    def fuse(
+        self, events: list[FlatEvent], until_ns: int, wanted: Collection[SensorType] = (), *, keep_up: bool = False
+    ) -> dict[int, EventColumn]:
         """Feed the filter, stopping at every grid instant up to `until_ns` for a pose.
 
-        Returns the events of the wanted fused sensors by handle, one for each accelerometer event.
+        keep_up: feed it though nobody asks for its poses. Returns the events of the wanted fused sensors by handle, one
+        for each accelerometer event.
         """
         if events and self._anchor_ns is None:
             self._anchor_ns = events[0][1]
             self._grids = {period: PoseGrid(period, self._anchor_ns, 0, 0) for period in self._grids}
-        if not self._grids and not wanted:
+        if not self._grids and not wanted and not keep_up:
             return {}
         started = self._clock.cpu_ns()
         done = 0

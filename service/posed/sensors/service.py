@@ -188,8 +188,8 @@ class SensorService:
         names = self.filter_names
         if filter_name is not None and filter_name not in names:
             raise InvalidArgumentError(
-                f"filter {filter_name!r} does not run here, only {', '.join(names)}; start the daemon with"
-                f" --filter {','.join((*names, filter_name))}"
+                f"filter {filter_name!r} does not run here, only {', '.join(names)}; name it too in the --filter that"
+                " the daemon starts with"
             )
         if len(self._table.inputs) < len(FUSION_INPUTS):
             missing = ", ".join(kind.string_type for kind in FUSION_INPUTS if kind not in self._table.inputs.values())
@@ -230,9 +230,14 @@ class SensorService:
 
     @property
     def fusion_clients(self) -> int:
-        """How many want what the filter says: the pose, and every listener of a fused sensor."""
+        """How many want what the first filter says: its pose, and every listener of a fused sensor."""
         listeners = sum(len(sensor.listeners) for sensor in self._table.all if sensor.info.type in FUSED)
-        return listeners + (self.pose_sampling_period_us is not None)
+        return listeners + (self._fusion.sampling_period_us is not None)
+
+    @property
+    def fusion_wanted(self) -> bool:
+        """True if somebody wants what a filter says."""
+        return bool(self._table.fused) or self.pose_sampling_period_us is not None
 
     @property
     def events_fused(self) -> int:
@@ -339,9 +344,11 @@ class SensorService:
         end_ns = self._device.end_ns
         until_ns = now_ns if end_ns is None else min(now_ns, end_ns)
         events = batch.flat(self._table.inputs)
-        virtual = self._fusion.fuse(events, until_ns, self._table.fused)
+        # Who asks for another filter's poses later finds it as old as the first.
+        keep_up = len(self._fusions) > 1 and self.fusion_wanted
+        virtual = self._fusion.fuse(events, until_ns, self._table.fused, keep_up=keep_up)
         for fusion in self._fusions[1:]:
-            fusion.fuse(events, until_ns, ())
+            fusion.fuse(events, until_ns, keep_up=keep_up)
         for handle, computation in self._table.computed:
             column = computation.take(events)
             if column is not None:
