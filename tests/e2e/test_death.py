@@ -114,6 +114,25 @@ def test_a_stopped_daemon_makes_poses_stale_and_sends_no_burst_when_it_goes_on(
         assert pose.missed >= 4
 
 
+def test_a_daemon_that_stops_in_the_middle_of_a_stream_is_lost_and_streams_again_when_it_goes_on(
+    desk: Any, eventually: Eventually
+) -> None:
+    daemon = desk.serve("--source", "sim:still")
+    listener = _Events()
+    with SensorManager() as manager:
+        gyroscope = manager.get_default_sensor(Sensor.TYPE_GYROSCOPE)
+        assert manager.register_listener(listener, gyroscope, SENSOR_DELAY_FASTEST)
+        eventually(lambda: len(listener.boot_events) >= 400)
+        daemon.send_signal(signal.SIGSTOP)
+        eventually(lambda: manager.state is ServiceState.DISCONNECTED)
+        listener.arrived.clear()
+        daemon.send_signal(signal.SIGCONT)
+        assert listener.arrived.wait(5)
+        assert manager.state is ServiceState.CONNECTED
+        times = [event.timestamp for event in listener.boot_events]
+        assert times == sorted(times)
+
+
 def test_close_returns_though_the_daemon_hangs(desk: Any) -> None:
     daemon = desk.serve("--source", "sim:still")
     client = PoseClient()

@@ -62,6 +62,6 @@ def test_poses_stand_on_the_grid_to_the_end(mode: RateMode) -> None:
 
 def test_a_filter_or_period_that_is_not_allowed_is_refused() -> None:
     with pytest.raises(InvalidArgumentError, match="no filter is named 'best'"):
-        next(fuse_recording(_recording(), _PROFILE, sampling_period_us=0, filter_name="best"))
+        next(fuse_recording(_recording(), _PROFILE, sampling_period_us=0, filters=["best"]))
     with pytest.raises(InvalidArgumentError, match="pose period 1 us"):
         next(fuse_recording(_recording(), _PROFILE, sampling_period_us=0, pose_period_us=1))

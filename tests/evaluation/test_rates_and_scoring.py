@@ -146,7 +146,7 @@ def test_the_poses_scored_are_those_that_a_daemon_publishes(trial: Trial, mode: 
     published = {
         pose.instant_ns: pose.orientation.quaternion
         for pose in fuse_recording(
-            trial.recording, profile, sampling_period_us=period_us, filter_name="dcm", aligned=aligned
+            trial.recording, profile, sampling_period_us=period_us, filters=["dcm"], aligned=aligned
         )
     }
     scored = {

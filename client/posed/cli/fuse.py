@@ -3,7 +3,6 @@
 import argparse
 import contextlib
 import errno
-import heapq
 import itertools
 import os
 import sys
@@ -57,19 +56,14 @@ def run(arguments: argparse.Namespace) -> int:
     for kind, count in recording.dropped_rows.items():
         if count:
             print(f"posed: note: {count} {kind.name.lower()} rows out of time order are left out", file=sys.stderr)
-    profile = load_profile(arguments.profile)
-    streams = [
-        fuse_recording(
-            recording,
-            profile,
-            sampling_period_us=RateMode[arguments.mode].sampling_period_us,
-            filter_name=name,
-            pose_period_us=round(1e6 / arguments.rate),
-            aligned=arguments.aligned,
-        )
-        for name in arguments.filters
-    ]
-    poses = heapq.merge(*streams, key=lambda pose: pose.instant_ns)
+    poses = fuse_recording(
+        recording,
+        load_profile(arguments.profile),
+        sampling_period_us=RateMode[arguments.mode].sampling_period_us,
+        filters=arguments.filters,
+        pose_period_us=round(1e6 / arguments.rate),
+        aligned=arguments.aligned,
+    )
     # A recording that cannot be fused says so at its first pose: before anything is written.
     first = list(itertools.islice(poses, 1))
     written = 0

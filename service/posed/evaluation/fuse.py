@@ -1,6 +1,7 @@
 """A whole recording turned into poses, without a daemon and without waiting."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from operator import attrgetter
 
 from posed.clock import VirtualClock
 from posed.events import Pose
@@ -16,12 +17,12 @@ def fuse_recording(
     profile: DeviceProfile,
     *,
     sampling_period_us: int,
-    filter_name: str = DEFAULT_FILTER,
+    filters: Sequence[str] = (DEFAULT_FILTER,),
     pose_period_us: int = 100_000,
     aligned: bool = False,
     step_ns: int = 1_000_000_000,
 ) -> Iterator[Pose]:
-    """Yield the poses that a daemon would publish from a recording, in order.
+    """Yield the poses that a daemon would publish from a recording, by instant, those of one instant as `filters`.
 
     sampling_period_us: asked of the sensors (`RateMode.sampling_period_us`; 0 = fastest). pose_period_us: 5,000 to
     1,000,000. aligned: turn each pose on to its grid instant. step_ns: sample time fused at once; it decides about
@@ -30,11 +31,16 @@ def fuse_recording(
     """
     clock = VirtualClock()
     source = ReplaySource(recording, profile, clock)
-    service = SensorService(source, make_device_filter(filter_name, profile), clock, aligned=aligned)
+    first, *beside = (make_device_filter(name, profile) for name in filters)
+    service = SensorService(source, first, clock, beside=beside, aligned=aligned)
     # The replay begins here: its first sample stands at the clock's 0.
-    service.register_pose("fuse", pose_period_us, sampling_period_us)
+    for name in filters:
+        service.register_pose(name, pose_period_us, sampling_period_us, name)
     end_ns = recording.end_ns - recording.start_ns
     for now_ns in (*range(step_ns, end_ns, step_ns), end_ns):
         clock.advance_to(now_ns)
         service.advance()
-        yield from service.take_poses()
+        yield from sorted(service.take_poses(), key=_instant_of)
+
+
+_instant_of = attrgetter("instant_ns")
