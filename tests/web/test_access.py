@@ -73,22 +73,26 @@ def test_a_server_asked_by_another_name_refuses(served: Served, host: str) -> No
 def test_the_port_of_http_is_left_out_as_browsers_do(host: str, port: int, base: str) -> None:
     links: list[str] = []
     access = Access(Starlette(), (host,), port, links.append)
-    assert links[0].startswith(f"{base}?token=")
-    scope = {
-        "type": "http",
-        "method": "GET",
-        "path": "/",
-        "query_string": links[0].partition("?")[2].encode(),
-        "headers": [(b"host", base.split("/")[2].encode())],
-    }
     sent: list[Message] = []
+    asked: list[Message] = [{"type": "lifespan.startup"}, {"type": "lifespan.shutdown"}, {"type": "http.request"}]
 
     async def receive() -> Message:
-        return {"type": "http.request"}
+        return asked.pop(0)
 
     async def send(message: Message) -> None:
         sent.append(message)
 
+    asyncio.run(access({"type": "lifespan"}, receive, send))
+    (link,) = links
+    assert link.startswith(f"{base}?token=")
+    scope = {
+        "type": "http",
+        "method": "GET",
+        "path": "/",
+        "query_string": link.partition("?")[2].encode(),
+        "headers": [(b"host", base.split("/")[2].encode())],
+    }
+    sent.clear()
     asyncio.run(access(scope, receive, send))
     assert sent[0]["status"] == 303
 

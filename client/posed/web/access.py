@@ -30,7 +30,10 @@ class Access:
     """ASGI middleware that lets in requests with a session, and hands a session out for the token in the link."""
 
     def __init__(self, app: ASGIApp, hosts: tuple[str, ...], port: int, tell_link: Callable[[str], None]) -> None:
-        """hosts: names and addresses by which this server may be asked. tell_link: shows a link to the user."""
+        """hosts: names and addresses by which this server may be asked.
+
+        tell_link: shows a link to the user, the first once the server runs and a signal ends it in order.
+        """
         self._app = app
         # Browsers leave the port of http out.
         suffix = "" if port == 80 else f":{port}"
@@ -40,12 +43,12 @@ class Access:
         self._cookie = f"posed-{port}"
         self._sessions: list[str] = []
         self._tell_link = tell_link
-        self._renew_token()
+        self._token = secrets.token_urlsafe(32)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer 403 to whoever has no business here, hand the rest on."""
         if scope["type"] == "lifespan":
-            await self._app(scope, receive, send)
+            await self._app(scope, receive, self._telling(send))
             return
         headers = Headers(scope=scope)
         refusal = self._refusal(scope, headers)
@@ -88,6 +91,14 @@ class Access:
     def _has_session(self, headers: Headers) -> bool:
         given = cookie_parser(headers.get("cookie", "")).get(self._cookie, "").encode()
         return any(hmac.compare_digest(given, session.encode()) for session in self._sessions)
+
+    def _telling(self, send: Send) -> Send:
+        async def send_and_tell(message: Message) -> None:
+            await send(message)
+            if message["type"] == "lifespan.startup.complete":
+                self._renew_token()
+
+        return send_and_tell
 
     def _renew_token(self) -> None:
         self._token = secrets.token_urlsafe(32)
