@@ -7,6 +7,7 @@ object.__setattr__ and costs the daemon a tenth of its time. None of it is chang
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
+from functools import lru_cache
 from itertools import repeat
 from operator import itemgetter
 
@@ -203,7 +204,7 @@ class EventBatch:
         events: list[FlatEvent] = []
         for handle in sorted(self.columns.keys() & sensor_types.keys()):
             column = self.columns[handle]
-            x, y, z = column.values[:, :3].T.tolist()
+            x, y, z, *_ = column.values.T.tolist()
             events += zip(repeat(int(sensor_types[handle])), column.timestamp_ns.tolist(), x, y, z)
         events.sort(key=_time_of)
         return events
@@ -235,6 +236,12 @@ class FilterStatus(IntFlag):
     Heading runs on the gyroscope, from north if it was ever seen."""
     ACCELEROMETER_LOST = 256
     """No accelerometer sample that could be used for 0.5 s: the tilt runs on the gyroscope."""
+
+
+@lru_cache
+def filter_status(bits: int) -> FilterStatus:
+    """Return the flags of these bits, kept: making them goes through a good deal of Python."""
+    return FilterStatus(bits)
 
 
 @dataclass(slots=True)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,9 +43,15 @@ def a_recording(seconds: float = 3.0) -> Recording:
     return Recording("walk", columns, {})
 
 
+def exact(profile: DeviceProfile) -> DeviceProfile:
+    """Return the profile with parts so fine that their values pass as they are."""
+    sensors = {kind: replace(part, resolution=1e-13, max_range=1e-6) for kind, part in profile.sensors.items()}
+    return replace(profile, sensors=sensors)
+
+
 RECORDING = a_recording()
-TABLET = load_profile("patonis2018")
-PHONE = load_profile("modern")
+TABLET = exact(load_profile("patonis2018"))
+PHONE = exact(load_profile("modern"))
 FIRST, LAST = RECORDING.start_ns, RECORDING.end_ns
 
 
@@ -98,6 +105,30 @@ def test_full_rate_yields_what_was_recorded() -> None:
     for info in source.sensors:
         assert_same(batch.columns[info.handle], RECORDING.columns[info.type])
     assert source.end_ns == LAST
+
+
+@pytest.mark.parametrize("step_ns", [100 * MS, 3_700 * MS])
+@pytest.mark.parametrize("rate_period_ns", [0, 20 * MS])
+def test_values_are_rounded_to_what_an_app_may_see(rate_period_ns: int, step_ns: int) -> None:
+    coarse = load_profile("patonis2018")
+    handles = (ACC, MAG, GYRO, GYRO_RAW)
+    source, _ = a_source(profile=coarse, loop=True, on=handles)
+    plain, _ = a_source(profile=TABLET, loop=True, on=handles)
+    for handle in handles:
+        for each in (source, plain):
+            each.batch(handle, rate_period_ns, 0)
+    until_ns = 2 * (LAST - FIRST + LOOP_GAP_NS) + FIRST
+    batches = [source.drain(min(end, until_ns)) for end in range(FIRST, until_ns + step_ns, step_ns)]
+    expected = plain.drain(until_ns)
+    for info in source.sensors:
+        parts = [batch.columns[info.handle] for batch in batches if info.handle in batch.columns]
+        found, recorded = EventColumn.concatenate(parts), expected.columns[info.handle]
+        assert info.resolution > 1e-6
+        step = info.resolution / 8
+        np.testing.assert_array_equal(found.timestamp_ns, recorded.timestamp_ns)
+        np.testing.assert_allclose(found.values[:, :3], recorded.values[:, :3], atol=0.5001 * step)
+        np.testing.assert_allclose(found.values[:, :3], np.rint(found.values[:, :3] / step) * step, rtol=1e-12)
+        np.testing.assert_array_equal(found.values[:, 3:], recorded.values[:, 3:])
 
 
 def test_a_sensor_never_given_a_period_runs_at_the_profiles_fastest() -> None:
@@ -307,7 +338,7 @@ def test_a_loop_continues_sample_time_behind_a_gap() -> None:
     size = len(recorded)
     assert found.timestamp_ns[:size].tolist() == recorded.timestamp_ns.tolist()
     assert found.timestamp_ns[size : 2 * size].tolist() == (recorded.timestamp_ns + pass_ns).tolist()
-    np.testing.assert_array_equal(found.values[size : 2 * size], recorded.values)
+    np.testing.assert_allclose(found.values[size : 2 * size], recorded.values, rtol=1e-13, atol=1e-13)
     assert np.max(np.diff(found.timestamp_ns)) > 500 * MS
     assert np.min(np.diff(found.timestamp_ns)) > 0
     assert found.timestamp_ns[-1] > FIRST + 2 * pass_ns

@@ -25,6 +25,8 @@ SIX = (*THREE, 14, 16, 35)
 SECOND = 1_000_000_000
 START = 5_000 * SECOND
 TABLET = load_profile("patonis2018")
+FINEST = 5e-5
+"""Above half of the finest step there is, 2**-26 of a part's range: that of its magnetometer, 4912 uT."""
 
 
 def changed(profile: DeviceProfile, **changes: object) -> DeviceProfile:
@@ -308,14 +310,14 @@ class TestPhysics:
         t = 1e-9 * (column.timestamp_ns - START).astype(np.float64)
         script = make_script("shake", 1)
         expected = rotation.to_device(script.attitude(t), script.acceleration(t) + np.array([0.0, 0.0, 9.80665]))
-        np.testing.assert_allclose(column.values, expected, atol=1e-9)
+        np.testing.assert_allclose(column.values, expected, atol=FINEST)
 
     def test_field_has_the_norm_dip_and_declination_of_thessaloniki(self) -> None:
         source, _ = phone(ideal(), "still")
         x, y, z = drained(source, 2, MAGNETIC_FIELD).values[-1]
         assert math.sqrt(x * x + y * y + z * z) == pytest.approx(46.9)
-        assert math.degrees(math.atan2(-z, math.hypot(x, y))) == pytest.approx(57.0)
-        assert math.degrees(math.atan2(x, y)) == pytest.approx(5.5)
+        assert math.degrees(math.atan2(-z, math.hypot(x, y))) == pytest.approx(57.0, abs=1e-4)
+        assert math.degrees(math.atan2(x, y)) == pytest.approx(5.5, abs=1e-4)
         truth = source.truth(START + SECOND)
         assert truth is not None
         assert math.degrees(truth.declination) == pytest.approx(5.5)
@@ -323,7 +325,7 @@ class TestPhysics:
     def test_field_turns_with_the_phone_and_keeps_its_norm(self) -> None:
         source, _ = phone(ideal(), "look-around")
         column = drained(source, 20, MAGNETIC_FIELD)
-        np.testing.assert_allclose(np.linalg.norm(column.values, axis=1), 46.9)
+        np.testing.assert_allclose(np.linalg.norm(column.values, axis=1), 46.9, atol=FINEST)
         assert np.ptp(column.values[:, 0]) > 10.0
 
     def test_magnet_is_seen(self) -> None:
@@ -397,7 +399,7 @@ class TestErrors:
     def test_noise_never_repeats(self) -> None:
         noisy = changed(ideal(), noise_density=0.01)
         values = drained(phone(noisy, "still", handles=(GYROSCOPE,))[0], 60, GYROSCOPE).values
-        assert len(np.unique(values)) == values.size
+        assert len(np.unique(values, axis=0)) == len(values)
 
     def test_the_profiles_noise_is_what_a_sample_shows(self) -> None:
         columns = phone(TABLET, "still")[0].drain(START + 60 * SECOND).columns
@@ -466,7 +468,8 @@ class TestErrors:
             raw, bias = columns[raw_handle].values[:, :3], columns[raw_handle].values[:, 3:]
             assert (bias == [0.3, -0.2, 0.1]).all()
             np.testing.assert_array_equal(columns[handle].timestamp_ns, columns[raw_handle].timestamp_ns)
-            np.testing.assert_allclose(columns[handle].values, (raw - bias) @ matrix.T, atol=1e-12)
+            step = profile.sensor(handle).resolution / 8
+            np.testing.assert_allclose(columns[handle].values, (raw - bias) @ matrix.T, atol=1.1 * step)
 
     def test_a_calibration_undoes_itself(self) -> None:
         calibration = {kind: Calibration(np.array([0.3, -0.2, 0.1]), 1.1 * np.eye(3)) for kind in TABLET.sensors}

@@ -220,16 +220,6 @@ def test_a_slow_consumer_loses_its_oldest_events_and_keeps_their_order() -> None
     assert connection.events_dropped == 14
 
 
-def test_values_are_quantised_to_an_eighth_of_the_resolution(make_bench: MakeBench) -> None:
-    bench = make_bench((GYRO,))
-    bench.source.value = 1.23456
-    listener = bench.service.connect()
-    bench.service.enable(listener, GYRO, 20_000, 0)
-    bench.advance_ms(20)
-    seen = listener.take(10).columns[GYRO].values[0].tolist()
-    assert seen == [988 * 0.00125] * 3
-
-
 def test_fusion_is_fed_what_apps_see(make_bench: MakeBench) -> None:
     bench = make_bench()
     bench.source.value = 1.23456

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posed.events import EventColumn, ReportingMode, SensorInfo, SensorType
+from posed.events import EventColumn, SensorInfo, SensorType
 from posed.sensors import Client
 from posed.sensors.client import HIGH_SAMPLING_RATE_SENSORS
 from posed.sensors.decimation import Decimator
-from posed.sensors.quantisation import Quantiser, as_listed
 from posed.sensors.recent_events import RecentEventLogger
 from posed.sensors.registration_log import RegistrationLog, RegistrationRecord
 
@@ -121,28 +120,3 @@ def test_500_registrations_are_remembered_the_newest_first() -> None:
         log.add(RegistrationRecord(number, True, 4, Client()))
     records = log.newest_first()
     assert [records[0].boot_ns, records[-1].boot_ns, len(records)] == [509, 10, 500]
-
-
-def test_a_listed_sensor_has_whole_steps_and_some_power() -> None:
-    listed = as_listed(_INFO)
-    assert listed.max_range == 502 * 0.02
-    assert listed.power_ma == 0.001
-    trigger = replace(_INFO, type=SensorType.STEP_COUNTER, resolution=0.0, reporting_mode=ReportingMode.ON_CHANGE)
-    assert as_listed(trigger).resolution == 1.0
-    fine = as_listed(replace(_INFO, resolution=1e-12))
-    assert fine.resolution == 2 * 10.035 / 2**24
-
-
-def test_the_bias_beside_uncalibrated_values_is_not_rounded() -> None:
-    quantise = Quantiser(replace(_INFO, type=SensorType.GYROSCOPE_UNCALIBRATED))
-    column = EventColumn(
-        np.array([1], np.int64), np.array([[0.0111, 0.0, 0.0, 0.0111, 0.0, 0.0]]), np.array([3], np.int8)
-    )
-    assert quantise(column).values.tolist() == [[4 * 0.0025, 0.0, 0.0, 0.0111, 0.0, 0.0]]
-    assert column.values[0, 0] == 0.0111
-
-
-def test_fused_values_are_not_rounded() -> None:
-    quantise = Quantiser(replace(_INFO, type=SensorType.ROTATION_VECTOR))
-    column = _column([1], [[0.0111, 0.0, 0.0]])
-    assert quantise(column) is column

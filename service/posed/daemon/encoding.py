@@ -1,6 +1,7 @@
 """Events, poses and truth as they cross the wire."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import cast
 
 from posed.clock import TimeMap
@@ -9,11 +10,13 @@ from posed.proto import events_pb2, pose_pb2, sensors_pb2
 from posed.sensors import EventChunk
 
 
+@lru_cache
 def pose_topic(period_us: int, filter_name: str) -> bytes:
     """Return the topic of a filter's poses of one period, zero byte included."""
     return f"pose/{period_us}/{filter_name}\0".encode("ascii")
 
 
+@lru_cache
 def truth_topic(period_us: int, filter_name: str) -> bytes:
     """Return the topic of the truth beside a filter's poses of one period, zero byte included."""
     return f"truth/{period_us}/{filter_name}\0".encode("ascii")
@@ -30,27 +33,31 @@ def delivery_header(boot_id: bytes, sequence: int, published_ns: int, mapping: T
 
 
 class PoseEncoder:
-    """Poses as bytes, made in one message that is kept: making one with its parts anew takes twice the time."""
+    """Poses as bytes, made in one message that is kept with its parts: making them anew takes twice the time."""
 
     def __init__(self, boot_id: bytes) -> None:
         self._message = pose_pb2.PoseMessage()
         self._header = self._message.header
         self._header.boot_id = boot_id
+        self._mapping = self._header.mapping
         self._pose = self._message.pose
+        self._quaternion = self._pose.orientation
+        self._rate = self._pose.angular_rate
+        self._has_position = False
 
     def encode(self, pose: Pose, published_ns: int, mapping: TimeMap) -> bytes:
         """Return the message of a pose sent at `published_ns` (CLOCK_BOOTTIME)."""
         header = self._header
         header.sequence = pose.sequence
         header.published_ns = published_ns
-        header.mapping.offset_ns = mapping.offset_ns
-        header.mapping.scale = mapping.scale
+        self._mapping.offset_ns = mapping.offset_ns
+        self._mapping.scale = mapping.scale
         orientation = pose.orientation
         message = self._pose
         message.timestamp_ns = orientation.timestamp_ns
-        quaternion = message.orientation
+        quaternion = self._quaternion
         quaternion.x, quaternion.y, quaternion.z, quaternion.w = orientation.quaternion
-        rate = message.angular_rate
+        rate = self._rate
         rate.x, rate.y, rate.z = orientation.angular_rate
         message.heading_accuracy = orientation.heading_accuracy
         message.filter = pose.filter_name
@@ -58,10 +65,12 @@ class PoseEncoder:
         message.rate_mode = cast("pose_pb2.RateMode", pose.rate_mode)
         message.events_fused = pose.events_fused
         message.predicted_ns = pose.predicted_ns
-        if pose.position is None:
-            message.ClearField("position")
-        else:
+        if pose.position is not None:
             message.position.CopyFrom(_position(pose.position, orientation.timestamp_ns))
+            self._has_position = True
+        elif self._has_position:
+            message.ClearField("position")
+            self._has_position = False
         return self._message.SerializeToString()
 
 

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import select
+import sys
 import time
 from collections.abc import Sequence
 
@@ -24,8 +25,11 @@ class Waiter:
         self._sockets = zmq.Poller()
         self._timer = _timerfd_create()
         self._armed_ns: int | None = None
+        self._interval_ns = 0
+        """After which the timer goes off again by itself; 0: never."""
+        self._passed_ns = 0
+        """The last deadline that came."""
         self._epoll = select.epoll()
-        # Edge-triggered, a timer that went off need not be read: setting it anew starts from nothing.
         self._epoll.register(self._timer, select.EPOLLIN | select.EPOLLET)
         for each in sockets:
             self._sockets.register(each, zmq.POLLIN)
@@ -49,15 +53,23 @@ class Waiter:
         Returns False if it was the deadline alone.
         """
         if deadline_ns != self._armed_ns:
-            _timerfd_settime(self._timer, deadline_ns)
+            # Poses are due at equal intervals: once set to them the timer is only read, for a third of what setting it
+            # costs.
+            self._interval_ns = max(0, deadline_ns - self._passed_ns) if deadline_ns and self._passed_ns else 0
+            _timerfd_settime(self._timer, deadline_ns, self._interval_ns)
             self._armed_ns = deadline_ns
         happened = False
         for fd, _ in self._epoll.poll():
             if fd == self._timer:
-                self._armed_ns = None
+                self._pass_deadline(int.from_bytes(os.read(fd, 8), sys.byteorder))
             else:
                 happened = True
         return happened
+
+    def _pass_deadline(self, times: int) -> None:
+        assert self._armed_ns is not None
+        self._passed_ns = self._armed_ns + (times - 1) * self._interval_ns
+        self._armed_ns = self._passed_ns + self._interval_ns if self._interval_ns else None
 
     def close(self) -> None:
         """Give the descriptors back; the sockets are their owners' to close."""
@@ -87,10 +99,10 @@ def _timerfd_create() -> int:
     return fd
 
 
-def _timerfd_settime(fd: int, deadline_ns: int | None) -> None:
+def _timerfd_settime(fd: int, deadline_ns: int | None, interval_ns: int) -> None:
     """Arm the timer; a value of zero disarms it, so a deadline that early is one nanosecond."""
-    _spec.it_value.tv_sec, _spec.it_value.tv_nsec = divmod(
-        0 if deadline_ns is None else max(1, deadline_ns), 1_000_000_000
-    )
+    value_ns = 0 if deadline_ns is None else max(1, deadline_ns)
+    for time_spec, ns in ((_spec.it_value, value_ns), (_spec.it_interval, interval_ns)):
+        time_spec.tv_sec, time_spec.tv_nsec = divmod(ns, 1_000_000_000)
     if _settime(fd, _TFD_TIMER_ABSTIME, _spec_pointer, None) < 0:
         raise OSError(ctypes.get_errno(), "timerfd_settime failed")

@@ -12,7 +12,6 @@ from posed.fusion.event_arrays import EventArrays
 from posed.hal.profile import DeviceProfile, load_profile
 from posed.hal.recording import Recording
 from posed.hal.replay import ReplaySource
-from posed.sensors.quantisation import Quantiser, as_listed
 
 ModeName = Literal["native", "FASTEST", "GAME", "UI", "NORMAL"]
 MODES: tuple[ModeName, ...] = get_args(ModeName)
@@ -45,9 +44,7 @@ def mode_batch(trial: Trial, mode: ModeName, profile: DeviceProfile | None = Non
     for kind in INPUTS:
         source.batch(int(kind), RateMode[mode].sampling_period_us * 1000, 0)
         source.activate(int(kind), True)
-    quantisers = {info.handle: Quantiser(as_listed(info)) for info in source.sensors}
-    drained = source.drain(recording.end_ns)
-    return EventBatch({handle: quantisers[handle](column) for handle, column in drained.columns.items()})
+    return source.drain(recording.end_ns)
 
 
 def event_arrays(batch: EventBatch) -> EventArrays:

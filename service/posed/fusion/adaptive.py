@@ -18,7 +18,7 @@ from math import pi, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
-from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
+from posed.events import FilterStatus, FlatEvent, Orientation, SensorType, filter_status
 from posed.fusion.adaptive_corrections import Corrections
 from posed.fusion.adaptive_state import AdaptiveParams, AdaptiveState
 from posed.fusion.direction_cosines import DirectionCosines
@@ -141,7 +141,7 @@ class AdaptiveFilter:
         c.north_x = heading.north_x * east_x + heading.north_y * c.north_x
         c.north_y = heading.north_x * east_y + heading.north_y * c.north_y
         c.north_z = heading.north_x * east_z + heading.north_y * c.north_z
-        return Orientation(s.time_ns, c.quaternion(), rate, accuracy, FilterStatus(status))
+        return Orientation(s.time_ns, c.quaternion(), rate, accuracy, filter_status(status))
 
     def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return the gyroscope's bias and its standard deviations, rad/s in device axes."""

@@ -19,7 +19,7 @@ from math import atan2, pi, sqrt
 from typing import Any
 
 from posed.errors import InvalidArgumentError
-from posed.events import FilterStatus, FlatEvent, Orientation, SensorType
+from posed.events import FilterStatus, FlatEvent, Orientation, SensorType, filter_status
 from posed.fusion.dcm_state import DcmParams, DcmState
 from posed.fusion.event_arrays import MAX_HELD, EventArrays
 from posed.fusion.gate import MagneticGate
@@ -112,7 +112,7 @@ class DcmFilter:
         if s.free_fall:
             status |= _FREE_FALL
         rate = (s.rate_x, s.rate_y, s.rate_z)
-        return Orientation(s.time_ns, s.matrix.quaternion(), rate, accuracy, FilterStatus(status))
+        return Orientation(s.time_ns, s.matrix.quaternion(), rate, accuracy, filter_status(status))
 
     def gyro_bias(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return the bias learnt at rest and its standard deviations, rad/s in device axes."""

@@ -13,6 +13,7 @@ import numpy as np
 from posed.errors import InvalidArgumentError, ProfileError
 from posed.events import ReportingMode, SensorInfo, SensorType
 from posed.hal.calibration import Calibration
+from posed.hal.quantisation import as_listed
 from posed.hal.toml_table import TomlTable, close_match
 
 UNCALIBRATED_TYPE: Mapping[SensorType, SensorType] = {
@@ -129,19 +130,21 @@ class AmbientPart:
 
     def info(self) -> SensorInfo:
         """Return the sensor as Android lists it."""
-        return SensorInfo(
-            handle=int(self.type),
-            type=self.type,
-            name=self.name,
-            vendor=self.vendor,
-            version=self.version,
-            max_range=self.max_range,
-            resolution=self.resolution,
-            power_ma=self.power_ma,
-            min_delay_us=_min_delay_us(self.rates_hz) if self.rates_hz else 0,
-            max_delay_us=_max_delay_us(self.rates_hz) if self.rates_hz else 0,
-            reporting_mode=self.mode,
-            wake_up=self.type is SensorType.PROXIMITY,
+        return as_listed(
+            SensorInfo(
+                handle=int(self.type),
+                type=self.type,
+                name=self.name,
+                vendor=self.vendor,
+                version=self.version,
+                max_range=self.max_range,
+                resolution=self.resolution,
+                power_ma=self.power_ma,
+                min_delay_us=_min_delay_us(self.rates_hz) if self.rates_hz else 0,
+                max_delay_us=_max_delay_us(self.rates_hz) if self.rates_hz else 0,
+                reporting_mode=self.mode,
+                wake_up=self.type is SensorType.PROXIMITY,
+            )
         )
 
 
@@ -289,19 +292,21 @@ def _kinds(part: SensorType) -> tuple[SensorType, SensorType]:
 
 
 def _sensor_info(part: SensorProfile, kind: SensorType) -> SensorInfo:
-    return SensorInfo(
-        handle=int(kind),
-        type=kind,
-        name=part.name if kind is part.type else f"{part.name} Uncalibrated",
-        vendor=part.vendor,
-        version=part.version,
-        max_range=part.max_range,
-        resolution=part.resolution,
-        power_ma=part.power_ma,
-        min_delay_us=part.min_delay_us,
-        max_delay_us=part.max_delay_us,
-        fifo_reserved_event_count=part.fifo_reserved,
-        fifo_max_event_count=part.fifo_max,
+    return as_listed(
+        SensorInfo(
+            handle=int(kind),
+            type=kind,
+            name=part.name if kind is part.type else f"{part.name} Uncalibrated",
+            vendor=part.vendor,
+            version=part.version,
+            max_range=part.max_range,
+            resolution=part.resolution,
+            power_ma=part.power_ma,
+            min_delay_us=part.min_delay_us,
+            max_delay_us=part.max_delay_us,
+            fifo_reserved_event_count=part.fifo_reserved,
+            fifo_max_event_count=part.fifo_max,
+        )
     )
 
 

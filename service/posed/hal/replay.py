@@ -8,10 +8,11 @@ import numpy as np
 
 from posed.clock import Clock, TimeMap
 from posed.errors import InvalidArgumentError, RecordingError
-from posed.events import EventBatch, EventColumn, SensorInfo, SensorType, Truth
+from posed.events import EventBatch, EventColumn, Float64Array, SensorInfo, SensorType, Truth
 from posed.hal.attitude_trial import load_trial
 from posed.hal.csv_recording import load_csv
 from posed.hal.profile import UNCALIBRATED_TYPE, DeviceProfile, SensorProfile
+from posed.hal.quantisation import Quantiser
 from posed.hal.recording import Recording, read_only
 from posed.hal.thinning import LONGEST_HOLD_NS, mean_between, thin_by_mean, thin_by_nearest
 
@@ -72,7 +73,7 @@ class ReplaySource:
             column = _calibrated(recording, profile, info.type)
             if column is not None and len(column):
                 infos.append(info)
-                self._streams[info.handle] = _Stream(info.type, column, profile.sensor(info.handle), recording.start_ns)
+                self._streams[info.handle] = _Stream(info, column, profile.sensor(info.handle), recording.start_ns)
         if not infos:
             held = ", ".join(kind.name.lower() for kind in recording.columns)
             raise RecordingError(
@@ -182,7 +183,7 @@ class ReplaySource:
             return None
         after_ns = max(self._drained_ns, stream.since_ns)
         shift_ns = self._shift_ns(after_ns)
-        row = bisect_right(stream.times, after_ns - shift_ns)
+        row = stream.row_after(after_ns - shift_ns)
         if row < len(stream.times):
             return stream.times[row] + shift_ns
         return stream.times[0] + shift_ns + self._pass_ns if self._loop else None
@@ -230,10 +231,11 @@ class ReplaySource:
 
 
 class _Stream:
-    """One sensor's column at its present rate, cut by time without a copy."""
+    """One sensor's column at its present rate, cut by time."""
 
-    def __init__(self, kind: SensorType, recorded: EventColumn, part: SensorProfile, anchor_ns: int) -> None:
-        self._is_gyroscope = kind in (SensorType.GYROSCOPE, SensorType.GYROSCOPE_UNCALIBRATED)
+    def __init__(self, info: SensorInfo, recorded: EventColumn, part: SensorProfile, anchor_ns: int) -> None:
+        self._is_gyroscope = info.type in (SensorType.GYROSCOPE, SensorType.GYROSCOPE_UNCALIBRATED)
+        self._quantiser = Quantiser(info)
         self._recorded = recorded
         # Of a single sample there is nothing to thin.
         gaps_ns = np.diff(recorded.timestamp_ns)
@@ -247,6 +249,13 @@ class _Stream:
         """Timestamp of the last row taken."""
         self._joins_ns: int | None = None
         """That of the last row at the rate before, until the first at this one is taken."""
+        self._reached_ns: int | None = None
+        """How far rows were taken, in the recording's own time."""
+        self._next_row = 0
+        """The first row behind that."""
+        self._rounded_from = 0
+        self._rounded_values: Float64Array = recorded.values[:0]
+        """Of the rows from _rounded_from on."""
         self._use(recorded)
 
     @property
@@ -268,28 +277,49 @@ class _Stream:
         return self._part.configured_period_ns(sampling_period_ns)
 
     def rows(self, after_ns: int, until_ns: int, shift_ns: int) -> EventColumn:
-        first = bisect_right(self.times, after_ns - shift_ns)
-        last = bisect_right(self.times, until_ns - shift_ns, first)
-        rows = self._column[first:last]
+        times = self.times
+        first = self.row_after(after_ns - shift_ns)
+        self._reached_ns = until_ns - shift_ns
+        near = first + _NEAR_ROWS
+        # To bisect all of a long recording costs the daemon a cache miss a step.
+        end = near if near < len(times) and times[near] > self._reached_ns else len(times)
+        last = self._next_row = bisect_right(times, self._reached_ns, first, end)
         if first == last:
-            return rows
+            return self._column[first:last]
+        stamps = self._column.timestamp_ns[first:last]
+        values = self._rounded(first, last)
         if self._joins_ns is not None:
-            rows = self._joined(rows, self._joins_ns - shift_ns)
+            values = self._joined(values, self._joins_ns - shift_ns, times[first])
             self._joins_ns = None
-        if shift_ns:
-            rows = EventColumn(rows.timestamp_ns + shift_ns, rows.values, rows.accuracy)
-        self._taken_ns = self.times[last - 1] + shift_ns
-        return rows
+        self._taken_ns = times[last - 1] + shift_ns
+        return EventColumn(stamps + shift_ns if shift_ns else stamps, values, self._column.accuracy[first:last])
 
-    def _joined(self, rows: EventColumn, since_ns: int) -> EventColumn:
+    def row_after(self, instant_ns: int) -> int:
+        """Return the first row later than an instant of the recording's own time."""
+        return self._next_row if instant_ns == self._reached_ns else bisect_right(self.times, instant_ns)
+
+    def _rounded(self, first: int, last: int) -> Float64Array:
+        """Return values of rows as an app sees them, rounded a block ahead."""
+        start = first - self._rounded_from
+        if start < 0 or start + last - first > len(self._rounded_values):
+            ahead = self._column.values[first : max(last, first + _ROUNDED_ROWS)]
+            self._rounded_values = self._quantiser(ahead)
+            self._rounded_values.flags.writeable = False
+            self._rounded_from = first
+            start = 0
+        return self._rounded_values[start : start + last - first]
+
+    def _joined(self, values: Float64Array, since_ns: int, first_ns: int) -> Float64Array:
         """Have the first row tell of all since the last one at the rate before, not of its own interval."""
-        mean = mean_between(self._recorded, since_ns, int(rows.timestamp_ns[0]))
+        mean = mean_between(self._recorded, since_ns, first_ns)
         if mean is None:
-            return rows
-        return EventColumn(rows.timestamp_ns, np.concatenate([mean[np.newaxis], rows.values[1:]]), rows.accuracy)
+            return values
+        return np.concatenate([self._quantiser(mean[np.newaxis]), values[1:]])
 
     def _use(self, column: EventColumn) -> None:
         self._column = read_only(column)
+        self._reached_ns = None
+        self._rounded_values = column.values[:0]
         # Bisection over a memoryview takes a third of the time of a numpy search for one instant, and no memory.
         self.times = column.timestamp_ns.data
 
@@ -299,6 +329,11 @@ class _Stream:
             return self._recorded
         thin = thin_by_mean if self._is_gyroscope else thin_by_nearest
         return thin(self._recorded, rate_hz, self._anchor_ns)
+
+
+_NEAR_ROWS = 64
+"""More than a sensor samples in a tenth of a second."""
+_ROUNDED_ROWS = 256
 
 
 def _calibrated(recording: Recording, profile: DeviceProfile, kind: SensorType) -> EventColumn | None:

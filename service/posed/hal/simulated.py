@@ -1,15 +1,16 @@
 """A simulated phone: a motion script seen through the parts of a device profile."""
 
 from bisect import bisect_right
+from collections.abc import Callable
 
 import numpy as np
 
 from posed.clock import Clock, TimeMap
 from posed.errors import InvalidArgumentError
-from posed.events import EventBatch, EventColumn, SensorInfo, SensorType, Truth
-from posed.hal.calibration import Calibration
+from posed.events import EventBatch, EventColumn, Float64Array, SensorInfo, SensorType, Truth
 from posed.hal.motion import MotionScript
 from posed.hal.profile import UNCALIBRATED_TYPE, DeviceProfile, exact_period_ns
+from posed.hal.quantisation import Quantiser
 from posed.hal.sensor_model import BLOCK_SAMPLES, THESSALONIKI, SensorModel, Site
 from posed.hal.surroundings import Surroundings
 
@@ -32,6 +33,7 @@ class SimulatedPhone:
             kind: SensorModel(part, profile.calibration[kind], script, site, seed)
             for kind, part in profile.sensors.items()
         }
+        self._quantisers = {info.handle: Quantiser(info) for info in profile.sensor_infos()}
         self._rates = {info.handle: profile.sensor(info.handle).rates_hz[-1] for info in profile.sensor_infos()}
         self._surroundings = Surroundings(profile.ambient, seed)
         self._streams: dict[int, _Stream] = {}
@@ -146,9 +148,16 @@ class SimulatedPhone:
             self._zero_ns = after_ns
         kind = self._profile.sensor(handle).type
         calibration = self._profile.calibration[kind]
-        uncalibrated = handle == UNCALIBRATED_TYPE[kind]
+        bias = calibration.bias if handle == UNCALIBRATED_TYPE[kind] else None
+
+        def seen(raw: Float64Array) -> Float64Array:
+            """Return what an app sees of what the part measures."""
+            if bias is None:
+                return self._quantisers[handle](calibration.apply(raw))
+            return self._quantisers[handle](np.concatenate([raw, np.broadcast_to(bias, raw.shape)], axis=1))
+
         self._streams[handle] = _Stream(
-            self._models[kind], calibration, uncalibrated, self._rates[handle], self._zero_ns, after_ns, since_ns
+            self._models[kind], seen, self._rates[handle], self._zero_ns, after_ns, since_ns
         )
 
 
@@ -161,16 +170,14 @@ class _Stream:
     def __init__(
         self,
         model: SensorModel,
-        calibration: Calibration,
-        uncalibrated: bool,
+        seen: Callable[[Float64Array], Float64Array],
         rate_hz: float,
         zero_ns: int,
         after_ns: int,
         since_ns: int | None,
     ) -> None:
         self._model = model
-        self._calibration = calibration
-        self._uncalibrated = uncalibrated
+        self._seen = seen
         self._rate_hz = rate_hz
         self._zero_ns = zero_ns
         self.after_ns = after_ns
@@ -232,11 +239,7 @@ class _Stream:
         """Return a block and its timestamps, ns."""
         timestamp_ns, raw = self._model.block(self._rate_hz, index, joins)
         timestamp_ns += self._zero_ns
-        if self._uncalibrated:
-            values = np.concatenate([raw, np.broadcast_to(self._calibration.bias, raw.shape)], axis=1)
-        else:
-            values = self._calibration.apply(raw)
-        return EventColumn(timestamp_ns, values, _HIGH_ACCURACY), timestamp_ns.tolist()
+        return EventColumn(timestamp_ns, self._seen(raw), _HIGH_ACCURACY), timestamp_ns.tolist()
 
 
 # Of a block at 200 Hz, the last third of a second: later than this is soon enough, and a rate may yet change.

@@ -12,6 +12,9 @@ class SensorSource(Protocol):
     A source is given its Clock when it is made. What it yields depends on the calls made between two drains, never on
     how often it is drained.
 
+    Values are what an app may see, rounded by `posed.hal.quantisation`; filters get the same, as in Android: so gravity
+    and linear acceleration add up to the accelerometer.
+
     A source that can lose its phone raises SourceLostError from activate, batch, flush, drain and next_sample_ns, at
     least once and until it has one again. Then it has forgotten what was activated and batched, and the samples of the
     time between; its sensors are the same. The caller tries again, beginning with batch and activate.
@@ -19,7 +22,7 @@ class SensorSource(Protocol):
 
     @property
     def sensors(self) -> tuple[SensorInfo, ...]:
-        """The physical sensors, in handle order; the same for the life of the source."""
+        """The physical sensors as the list shows them, in handle order; the same for the life of the source."""
 
     @property
     def time_map(self) -> TimeMap:

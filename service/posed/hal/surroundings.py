@@ -5,6 +5,7 @@ import math
 from posed.errors import InvalidArgumentError
 from posed.events import EventColumn, ReportingMode, SensorInfo, SensorType
 from posed.hal.profile import AmbientPart, exact_period_ns
+from posed.hal.quantisation import Quantiser
 from posed.hal.seeded import SeededRandom
 
 _AT_FIRST = {SensorType.PRESSURE: 1013.25, SensorType.LIGHT: 300.0}
@@ -25,6 +26,7 @@ class Surroundings:
         self._values = {
             handle: _Value(_AT_FIRST.get(part.type, part.max_range)) for handle, part in self._parts.items()
         }
+        self._quantisers = {handle: Quantiser(part.info()) for handle, part in self._parts.items()}
         self._periods_ns = dict.fromkeys(self._parts, 0)
         self._active: dict[int, _Sampled | _Changes] = {}
         self._seed = seed
@@ -86,7 +88,11 @@ class Surroundings:
         columns = {handle: active.take(until_ns) for handle, active in self._active.items()}
         for value in self._values.values():
             value.forget_before(until_ns)
-        return {handle: column for handle, column in columns.items() if column is not None}
+        return {
+            handle: EventColumn(column.timestamp_ns, self._quantisers[handle](column.values), column.accuracy)
+            for handle, column in columns.items()
+            if column is not None
+        }
 
     def next_sample_ns(self, handle: int) -> int | None:
         """Return when the next sample of a sensor is due, None if it is off or nothing changes."""

@@ -1,15 +1,14 @@
 """What stands between the service and its source, as AOSP's SensorDevice stands before the HAL (SensorDevice.cpp)."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from posed.clock import Clock, TimeMap
 from posed.errors import SourceLostError
-from posed.events import EventBatch, SensorInfo, SensorType
+from posed.events import EventBatch, SensorType
 from posed.hal.source import SensorSource
 from posed.sensors.arbitration import BatchParams
-from posed.sensors.quantisation import Quantiser, as_listed
 
 _log = logging.getLogger(__name__)
 _T = TypeVar("_T")
@@ -19,17 +18,12 @@ RECONNECT_INTERVAL_NS = 500_000_000
 
 
 class SensorDevice:
-    """A source whose loss nobody above it sees but as a gap, and whose values have the resolution they claim.
-
-    Values are rounded here, before fusion, as in Android: so gravity and linear acceleration add up to the
-    accelerometer that an app sees.
-    """
+    """A source whose loss nobody above it sees but as a gap."""
 
     def __init__(self, source: SensorSource, clock: Clock) -> None:
         self._source = source
         self._clock = clock
-        self.sensors: tuple[SensorInfo, ...] = tuple(as_listed(info) for info in source.sensors)
-        self._quantisers = {info.handle: Quantiser(info) for info in self.sensors}
+        self.sensors = source.sensors
         self._active: dict[int, BatchParams] = {}
         self._flushing: list[int] = []
         self.retry_ns: int | None = None
@@ -74,7 +68,7 @@ class SensorDevice:
         self._flushing.append(handle)
 
     def drain(self, until_ns: int) -> EventBatch:
-        """Return what is new up to `until_ns` (sample time), rounded; nothing but flush-completes while it is lost."""
+        """Return what is new up to `until_ns` (sample time); nothing but flush-completes while it is lost."""
         if self.retry_ns is not None and self._clock.now_ns() >= self.retry_ns:
             self._reconnect()
         if self.retry_ns is not None:
@@ -87,14 +81,13 @@ class SensorDevice:
             return self._drain_of_lost()
         finally:
             self.cpu_ns += self._clock.cpu_ns() - started
-        connected = self._follow_dynamic(batch) if batch.connected or batch.disconnected else ()
-        columns = {handle: self._quantisers[handle](column) for handle, column in batch.columns.items()}
-        flushes = []
-        for handle in batch.flush_completes:
-            if handle in self._flushing:  # a flush-complete that nobody asked for is nobody's
-                self._flushing.remove(handle)
-                flushes.append(handle)
-        return EventBatch(columns, flushes, connected, batch.disconnected)
+        self._dynamic.update(info.handle for info in batch.connected)
+        for handle in batch.disconnected:
+            self._drop_dynamic(handle)
+        if batch.flush_completes:
+            asked = self._asked(batch.flush_completes)
+            batch = EventBatch(batch.columns, asked, batch.connected, batch.disconnected)
+        return batch
 
     def set_environment(self, kind: SensorType, value: float) -> None:
         """Set what an ambient sensor reads from now on; raises as the source does."""
@@ -114,21 +107,21 @@ class SensorDevice:
         """Go on after a time in which nobody could drain."""
         self._call(self._source.resume)
 
+    def _asked(self, flush_completes: Sequence[int]) -> list[int]:
+        """Return the flush-completes that somebody asked for: any other is nobody's."""
+        asked = []
+        for handle in flush_completes:
+            if handle in self._flushing:
+                self._flushing.remove(handle)
+                asked.append(handle)
+        return asked
+
     def _drain_of_lost(self) -> EventBatch:
         flushes, self._flushing = self._flushing, []
         gone = sorted(self._dynamic)
         for handle in gone:
             self._drop_dynamic(handle)
         return EventBatch({}, flushes, (), gone)
-
-    def _follow_dynamic(self, batch: EventBatch) -> tuple[SensorInfo, ...]:
-        connected = tuple(as_listed(info) for info in batch.connected)
-        for info in connected:
-            self._quantisers[info.handle] = Quantiser(info)
-            self._dynamic.add(info.handle)
-        for handle in batch.disconnected:
-            self._drop_dynamic(handle)
-        return connected
 
     def _drop_dynamic(self, handle: int) -> None:
         self._dynamic.discard(handle)

@@ -16,23 +16,18 @@ _DEFAULT_SIZE = 10
 
 
 class RecentEventLogger:
-    """A ring of one sensor's last events, kept as the columns in which they came."""
+    """A ring of one sensor's last events, kept as the columns in which they came, each of one event at least."""
 
     def __init__(self, kind: SensorType) -> None:
         self._size = _SIZES.get(kind, _DEFAULT_SIZE)
-        self._columns: deque[tuple[int, int, EventColumn]] = deque()
-        """How many, when they were taken in, and the events."""
-        self._count = 0
+        self._columns: deque[tuple[int, EventColumn]] = deque(maxlen=self._size)
+        """When they were taken in, and the events."""
         self._last_is_current = False
 
     def add(self, column: EventColumn, boot_ns: int) -> None:
         """Note events, at least one, taken in at `boot_ns` (CLOCK_BOOTTIME)."""
-        columns, count = self._columns, len(column.timestamp_ns)
-        columns.append((count, boot_ns, column))
-        self._count += count
+        self._columns.append((boot_ns, column))
         self._last_is_current = True
-        while self._count - columns[0][0] >= self._size:
-            self._count -= columns.popleft()[0]
 
     def set_last_event_stale(self) -> None:
         """Say that a new activation begins: what was seen before it is not its."""
@@ -41,13 +36,13 @@ class RecentEventLogger:
     @property
     def last_if_current(self) -> EventColumn | None:
         """The last event, None if it is not of this activation."""
-        return self._columns[-1][2][-1:] if self._last_is_current else None
+        return self._columns[-1][1][-1:] if self._last_is_current else None
 
     def events(self) -> Iterator[tuple[int, int, list[float]]]:
         """Yield (sample time ns, CLOCK_BOOTTIME ns when it was taken in, values), oldest first."""
-        skipped = max(0, self._count - self._size)
-        for count, boot_ns, column in self._columns:
-            rows = column[skipped:]
-            skipped = max(0, skipped - count)
+        skipped = sum(len(column) for _, column in self._columns) - self._size
+        for boot_ns, column in self._columns:
+            rows = column[max(0, skipped) :]
+            skipped -= len(column)
             for timestamp_ns, values in zip(rows.timestamp_ns.tolist(), rows.values.tolist(), strict=True):
                 yield timestamp_ns, boot_ns, values

@@ -296,7 +296,7 @@ class SensorService:
             due += instants if end_ns is None else [t for t in instants if t <= end_ns]
             if fusion.awaits_first_sample:
                 due += [t for t in map(device.next_sample_ns, self._table.inputs) if t is not None]
-        for sensor in self._table.active:
+        for sensor in self._table.active if self._connections else ():
             latency_ns = sensor.latency_ns
             if latency_ns is None:
                 continue
@@ -354,7 +354,8 @@ class SensorService:
             if column is not None:
                 virtual[handle] = column
         self._table.take_in((*batch.columns.items(), *virtual.items()))
-        self._release_due()
+        if self._connections:
+            self._release_due()
         for handle in batch.flush_completes:
             self._release(self._table[handle])
         for handle in batch.flush_completes:

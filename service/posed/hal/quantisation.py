@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from posed.events import EventColumn, SensorInfo, SensorType
+from posed.events import Float64Array, SensorInfo, SensorType
 
 _RESOLUTION_SHARE = 0.125
 _MIN_POWER_MA = 0.001
@@ -48,7 +48,7 @@ _ONE_VALUE = (_OF_RESOLUTION_ONE - {SensorType.STEP_COUNTER}) | {
 
 
 def as_listed(info: SensorInfo) -> SensorInfo:
-    """Return a source's sensor as the list shows it: sound power, resolution, and a range of whole steps of it."""
+    """Return a sensor as the list shows it: sound power, resolution, and a range of whole steps of it."""
     resolution = info.resolution
     if info.type in _THREE_AXES:
         # No part resolves more than 24 bits of its range.
@@ -62,19 +62,22 @@ def as_listed(info: SensorInfo) -> SensorInfo:
 
 
 class Quantiser:
-    """Rounds the values of one sensor; the bias beside uncalibrated values stays as it is."""
+    """Rounds the values of one sensor; the bias beside uncalibrated values stays as it is.
+
+    Android's framework rounds what the HAL delivers, a batch at a time; here every source does it where it makes or
+    reads its samples, for a hundred of them at once: in the daemon that is a tenth of a wake-up.
+    """
 
     def __init__(self, info: SensorInfo) -> None:
         self._step = _RESOLUTION_SHARE * info.resolution
         self._axes = 3 if info.type in _THREE_AXES else int(info.type in _ONE_VALUE)
 
-    def __call__(self, column: EventColumn) -> EventColumn:
-        """Return the column with rounded values."""
+    def __call__(self, values: Float64Array) -> Float64Array:
+        """Return values, float64[n, w], rounded."""
         if not self._axes or not self._step:
-            return column
-        values = column.values
-        rounded = np.rint(values / self._step)
+            return values
+        rounded: Float64Array = np.rint(values / self._step)
         rounded *= self._step
         if values.shape[1] > self._axes:
             rounded[:, self._axes :] = values[:, self._axes :]
-        return EventColumn(column.timestamp_ns, rounded, column.accuracy)
+        return rounded
