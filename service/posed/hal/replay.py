@@ -279,7 +279,7 @@ class _Stream:
     def rows(self, after_ns: int, until_ns: int, shift_ns: int) -> EventColumn:
         times = self.times
         first = self.row_after(after_ns - shift_ns)
-        self._reached_ns = until_ns - shift_ns
+        self._reached_ns = max(after_ns, until_ns) - shift_ns
         near = first + _NEAR_ROWS
         # To bisect all of a long recording costs the daemon a cache miss a step.
         end = near if near < len(times) and times[near] > self._reached_ns else len(times)
