@@ -79,6 +79,17 @@ def eventually() -> Callable[[Callable[[], object]], None]:
     return wait
 
 
+@pytest.fixture
+def stop_process(eventually: Callable[[Callable[[], object]], None]) -> Callable[[int], None]:
+    """Stop a process by SIGSTOP and return once it stands still: on another core it runs on for a moment."""
+
+    def stop(pid: int) -> None:
+        os.kill(pid, signal.SIGSTOP)
+        eventually(lambda: Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T")
+
+    return stop
+
+
 @pytest.fixture(scope="session", autouse=True)
 def _interruptible() -> None:
     """A shell's background job ignores SIGINT and hands that down; the programs under test are to end by it."""

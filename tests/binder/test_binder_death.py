@@ -3,7 +3,7 @@
 import signal
 import socket
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -189,10 +189,12 @@ def test_death_of_the_daemon_reaches_recipients_then_on_disconnected(
     assert not unconnected.unlink_to_death(unlinked)
 
 
-def test_call_under_way_fails_when_the_daemon_dies(socket_path: Path, unconnected: Connection) -> None:
+def test_call_under_way_fails_when_the_daemon_dies(
+    socket_path: Path, unconnected: Connection, stop_process: Callable[[int], None]
+) -> None:
     with running("server", socket_path, "ready") as daemon:
         pump(unconnected, lambda: unconnected.connected)
-        daemon.send_signal(signal.SIGSTOP)  # seen by its missing heartbeats
+        stop_process(daemon.pid)  # seen by its missing heartbeats
         with pytest.raises(DeadObjectError, match="went away"):
             unconnected.ping(timeout_s=600)
 

@@ -6,6 +6,7 @@ import os
 import select
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -99,9 +100,9 @@ def test_stop_leaves_a_daemon_to_the_clients_that_need_it(shell: Shell) -> None:
         assert (forced.returncode, forced.stdout) == (0, f"stopped: process {pid}\n")
 
 
-def test_a_daemon_that_hangs_is_told_from_none(shell: Shell) -> None:
+def test_a_daemon_that_hangs_is_told_from_none(shell: Shell, stop_process: Callable[[int], None]) -> None:
     shell.run("start")
-    os.kill(shell.daemon_pid, signal.SIGSTOP)
+    stop_process(shell.daemon_pid)
     for command in ("status", "stop"):
         asked = shell.run(command)
         assert asked.returncode == cli.EX_UNAVAILABLE

@@ -1,8 +1,6 @@
 """The SDK's binding when calls come at awkward moments: from callbacks, while the daemon goes, before it is there."""
 
 import itertools
-import os
-import signal
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -149,11 +147,11 @@ def test_calls_to_a_daemon_that_is_away_end_with_one_error(desk: Any, eventually
         assert manager.register_listener(listener, gyroscope, SENSOR_DELAY_GAME)
 
 
-def test_a_hanging_daemon_is_unavailable(desk: Any) -> None:
+def test_a_hanging_daemon_is_unavailable(desk: Any, stop_process: Callable[[int], None]) -> None:
     daemon = desk.serve("--source", "sim:still")
     with SensorManager() as manager:
         manager.wait_connected()
-        os.kill(daemon.pid, signal.SIGSTOP)
+        stop_process(daemon.pid)
         with pytest.raises(ServiceUnavailableError):
             manager.get_statistics()
 

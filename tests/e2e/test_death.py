@@ -133,11 +133,11 @@ def test_a_daemon_that_stops_in_the_middle_of_a_stream_is_lost_and_streams_again
         assert times == sorted(times)
 
 
-def test_close_returns_though_the_daemon_hangs(desk: Any) -> None:
+def test_close_returns_though_the_daemon_hangs(desk: Any, stop_process: Callable[[int], None]) -> None:
     daemon = desk.serve("--source", "sim:still")
     client = PoseClient()
     assert client.next_pose(timeout_s=5) is not None
-    daemon.send_signal(signal.SIGSTOP)
+    stop_process(daemon.pid)
     client.close()
     assert client.state is ServiceState.CLOSED
     assert client.next_pose() is None or client.next_pose() is None
