@@ -71,8 +71,8 @@ def test_dumpsys_agrees_exactly_with_what_each_of_20_clients_received(
 
         while not (listeners()[_SLOW].events_dropped or manager.get_statistics().source_ended):
             slow.send_signal(signal.SIGSTOP)
-            # A second later it would be taken for dead, and asking takes its time.
-            until = time.monotonic() + 0.7
+            # A second later it would be taken for dead.
+            until = time.monotonic() + 0.9
             while time.monotonic() < until and not listeners()[_SLOW].events_dropped:
                 pause.wait(0.01)
             slow.send_signal(signal.SIGCONT)
