@@ -1,8 +1,6 @@
 """A recording: what a phone's sensors said and, where it was measured, how the phone was really held."""
 
-import gzip
 import math
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -153,10 +151,7 @@ def read_text(path: Path) -> str:
     except OSError as error:
         raise RecordingError(f"{path} cannot be read ({error.strerror}); name an existing, readable file") from error
     if path.suffix == ".gz":
-        try:
-            raw = gzip.decompress(raw)
-        except (OSError, EOFError, zlib.error) as error:
-            raise RecordingError(f"{path} is not a whole gzip file ({error}); unpack or copy it again") from error
+        raw = _unpacked(path, raw)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -164,6 +159,16 @@ def read_text(path: Path) -> str:
     if not text.strip():
         raise RecordingError(f"{path} is empty; expected one sample a line")
     return text
+
+
+def _unpacked(path: Path, raw: bytes) -> bytes:
+    import gzip  # memory that a daemon over a recording in plain text does not need
+    import zlib
+
+    try:
+        return gzip.decompress(raw)
+    except (OSError, EOFError, zlib.error) as error:
+        raise RecordingError(f"{path} is not a whole gzip file ({error}); unpack or copy it again") from error
 
 
 def _slerp(a: list[float], b: list[float], fraction: float) -> list[float]:
