@@ -47,7 +47,7 @@ def dealer(context: Context) -> Socket:
     socket = _connected(context, zmq.DEALER, high_water_mark=1000)
     socket.setsockopt(zmq.SNDHWM, 64)
     socket.setsockopt(zmq.LINGER, _FAREWELL_MS)
-    _heartbeat(socket, 900)
+    _heartbeat(socket, _LEISURELY_MS)
     return socket
 
 
@@ -90,16 +90,21 @@ _FAREWELL_MS = 200
 
 def _bound(context: Context, kind: int, high_water_mark: int) -> Socket:
     socket = _socket(context, kind, high_water_mark)
-    # On a pose socket a stopped client only costs what is sent in vain, and as many pings as on the control socket
-    # would wake the daemon twice a second more for each client. Clients send none there: they see a stopped daemon on
-    # the other.
-    _heartbeat(socket, 900 if kind == zmq.ROUTER else 3000)
+    # On a pose socket a stopped client only costs what is sent in vain. Clients send no ping there: they see a stopped
+    # daemon on the other.
+    _heartbeat(socket, _SOON_MS if kind == zmq.ROUTER else _LEISURELY_MS)
     # The mode of the directory keeps strangers out; this is the lock behind it.
     socket.setsockopt(zmq.IPC_FILTER_UID, os.getuid())
     # What does not begin as ZMTP 3 passes for ZMTP 1, which has no heartbeat: an HTTP request would keep its connection
     # for ever. A domain for ZAP, though nobody serves it, makes libzmq refuse the old versions.
     socket.setsockopt(zmq.ZAP_DOMAIN, b"posed")
     return socket
+
+
+# The daemon has a stopped client's registrations freed within 2 s. For a client the age of its poses tells sooner that
+# a daemon stands still, and each ping wakes the daemon twice: a tenth of what a pose client costs it, at one a second.
+_SOON_MS = 900
+_LEISURELY_MS = 3000
 
 
 def _heartbeat(socket: Socket, interval_ms: int) -> None:
