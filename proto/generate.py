@@ -334,10 +334,11 @@ bytes libzmq closes the connection without a word. A message of several frames (
 [TruthMessage](#truthmessage). Subscribe with topic and \
 zero byte exactly as [PoseRegistration](#poseregistration) gives them. The daemon's queue for a subscriber holds 10 \
 messages; what finds it full is dropped, and the sequence numbers show it.
-- Heartbeats: on the control socket both sides send ZMTP pings every 900 ms, on the pose socket the daemon does every \
-3,000 ms; who does not answer for 1,000 ms is cut off. libzmq answers by itself unless its receive queue is full: a \
-client that stops reading is cut off too. Set HEARTBEAT_IVL and HEARTBEAT_TIMEOUT, a receive high-water mark of 1,000 \
-(never 0) and RECONNECT_IVL 100, RECONNECT_IVL_MAX 500. A connection must finish its handshake within 500 ms.
+- Heartbeats: the daemon sends ZMTP pings every 900 ms on the control socket and every 3,000 ms on the pose socket, a \
+client every 3,000 ms on the control socket; who does not answer for 1,000 ms is cut off. libzmq answers by itself \
+unless its receive queue is full: a client that stops reading is cut off too. Set HEARTBEAT_IVL and \
+HEARTBEAT_TIMEOUT, a receive high-water mark of 1,000 (never 0) and RECONNECT_IVL 100, RECONNECT_IVL_MAX 500. A \
+connection must finish its handshake within 500 ms.
 - Whatever the daemon knows of a client (services it got, bindings, listeners) ends with its connection. After a \
 reconnect begin again with getService.
 
