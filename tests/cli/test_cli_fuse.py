@@ -88,6 +88,23 @@ def test_a_recording_without_a_magnetometer_has_no_pose(
     assert "it has no android.sensor.magnetic_field" in capsys.readouterr().err
 
 
+def test_a_recording_that_gives_no_pose_is_an_error(
+    recording: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    header, *rows = recording.read_text().splitlines()
+    path = tmp_path / "backwards.csv"
+    path.write_text("\n".join([header, *reversed(rows)]))
+    output = tmp_path / "poses.csv"
+    assert main(["fuse", str(path), "-o", str(output)]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "posed: note: 599 accelerometer rows out of time order are left out"
+    assert said[-1].startswith("posed: error: backwards gives no pose: in time order it has 1 accelerometer, ")
+    assert [line for line in said if "error" in line] == said[-1:]
+    assert not output.exists()
+    assert main(["fuse", str(path)]) == 1
+    assert capsys.readouterr().out == ""
+
+
 def test_filters_side_by_side_have_the_poses_that_each_has_alone(
     recording: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

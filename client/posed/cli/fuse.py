@@ -20,11 +20,12 @@ from posed.cli.options import (
     add_profile_option,
     add_rate_mode_option,
 )
-from posed.errors import InvalidArgumentError
+from posed.errors import InvalidArgumentError, RecordingError
 from posed.evaluation.fuse import fuse_recording
 from posed.events import Pose, RateMode
 from posed.fusion import DEFAULT_FILTER
 from posed.hal.profile import load_profile
+from posed.hal.recording import Recording
 from posed.hal.replay import load_recording
 
 HEADER = (
@@ -45,7 +46,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 Columns: {HEADER.replace(",", ", ")}.
 q is device to world (east, magnetic north, up), w in rad/s in device axes, status the bits of a pose's status;
 predicted_ns is how far --aligned turned q on past the newest gyroscope sample, timestamp_ns. Several filters get the
-same events and a row each at every instant. The same recording and options give the same bytes."""
+same events and a row each at every instant, from the first pose of each on. The same recording and options give the
+same bytes. A recording that gives no pose is an error, and nothing is written."""
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -66,6 +68,11 @@ def run(arguments: argparse.Namespace) -> int:
     )
     # A recording that cannot be fused says so at its first pose: before anything is written.
     first = list(itertools.islice(poses, 1))
+    if not first:
+        raise RecordingError(
+            f"{recording.name} gives no pose: in time order it has {_contents(recording)}; a pose needs samples of"
+            " accelerometer, gyroscope and magnetic_field, and its filter time to see gravity and north"
+        )
     written = 0
     with _output(arguments.output) as output, _progress(output) as progress:
         bar = progress.add_task(recording.name, total=recording.end_ns - recording.start_ns)
@@ -77,6 +84,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.output is not None:
         print(f"{written} poses written to {arguments.output}", file=sys.stderr)
     return 0
+
+
+def _contents(recording: Recording) -> str:
+    kinds = (f"{len(column)} {kind.name.lower()}" for kind, column in recording.columns.items())
+    return f"{', '.join(kinds)} rows over {(recording.end_ns - recording.start_ns) / 1e9:.3g} s"
 
 
 def csv_row(pose: Pose) -> str:
