@@ -1,5 +1,6 @@
 """posed watch, sensors, events and demo, as real commands."""
 
+import contextlib
 import json
 import math
 import os
@@ -13,6 +14,16 @@ import pytest
 from cli_shell import Shell
 
 from posed.cli.pose_text import JSON_KEYS
+
+
+@pytest.fixture
+def short_recording(tmp_path: Path) -> Path:
+    """Half a second of a phone that lies still."""
+    recording = tmp_path / "short.csv"
+    rows = ["accelerometer,{},0,0,9.81", "gyroscope,{},0,0,0", "magnetic_field,{},0,22,-43"]
+    lines = (row.format(at_ms * 1_000_000) for at_ms in range(0, 500, 20) for row in rows)
+    recording.write_text("sensor,timestamp_ns,x,y,z\n" + "\n".join(lines) + "\n")
+    return recording
 
 
 def test_poses_as_json(shell: Shell) -> None:
@@ -92,18 +103,54 @@ def test_sigterm_ends_events_with_its_code(shell: Shell) -> None:
     assert shell.end(stream, signal.SIGTERM) == (128 + signal.SIGTERM, "")
 
 
-@pytest.mark.parametrize("command", [["watch"], ["events", "gyroscope", "--rate=GAME"]])
-def test_a_stream_says_that_the_recording_has_ended(shell: Shell, tmp_path: Path, command: list[str]) -> None:
-    recording = tmp_path / "short.csv"
-    rows = ["accelerometer,{},0,0,9.81", "gyroscope,{},0,0,0", "magnetic_field,{},0,22,-43"]
-    lines = (row.format(at_ms * 1_000_000) for at_ms in range(0, 500, 20) for row in rows)
-    recording.write_text("sensor,timestamp_ns,x,y,z\n" + "\n".join(lines) + "\n")
-    shell.run("start", f"--source=replay:{recording}")
-    stream = shell.begin(*command)
-    assert stream.stderr is not None
-    while "the recording has ended" not in (said := stream.stderr.readline()):
-        assert said
-    assert shell.end(stream, signal.SIGINT) == (0, "")
+_STREAMS = [["watch"], ["watch", "--json", "--count=1000"], ["events", "gyroscope", "--latency=60000", "--rate=GAME"]]
+
+
+@pytest.mark.parametrize("command", _STREAMS)
+def test_a_stream_ends_with_the_recording(shell: Shell, short_recording: Path, command: list[str]) -> None:
+    shell.run("start", f"--source=replay:{short_recording}")
+    stream = shell.run(*command)
+    assert stream.returncode == 0
+    assert len(stream.stdout.splitlines()) >= 4
+    assert stream.stderr.startswith("posed: the recording has ended, so nothing more comes; ")
+    assert "'posed start'" in stream.stderr
+    late = shell.run(*command)
+    assert (late.returncode, late.stdout) == (1, "")
+    assert late.stderr == stream.stderr.replace("posed: ", "posed: error: ", 1)
+
+
+def test_a_wait_for_a_one_shot_sensor_ends_with_the_recording(shell: Shell, short_recording: Path) -> None:
+    shell.run("start", f"--source=replay:{short_recording}")
+    waited = shell.run("events", "significant_motion")
+    assert (waited.returncode, waited.stdout) == (1, "")
+    assert waited.stderr.startswith("posed: error: the recording has ended, ")
+
+
+@pytest.mark.parametrize("count", [None, 1000])
+def test_the_live_view_of_a_recording_that_ended_stays_unless_poses_are_counted(
+    shell: Shell, short_recording: Path, count: int | None
+) -> None:
+    shell.run("start", f"--source=replay:{short_recording}")
+    terminal, its_end = pty.openpty()
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "posed.cli", "watch", *([f"--count={count}"] if count else [])],
+        stdin=its_end,
+        stdout=its_end,
+        stderr=its_end,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "LINES": "24"},
+    )
+    os.close(its_end)
+    seen = b""
+    while b"the recording has ended" not in seen:
+        seen += os.read(terminal, 65536)
+    if count is None:
+        assert watch.poll() is None
+        watch.send_signal(signal.SIGINT)
+    with contextlib.suppress(OSError):  # how a pseudo-terminal tells that nobody writes to it any more
+        while os.read(terminal, 65536):
+            pass
+    os.close(terminal)
+    assert watch.wait(20) == 0
 
 
 def test_sensors(shell: Shell) -> None:

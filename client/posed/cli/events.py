@@ -6,11 +6,12 @@ import json
 import queue
 import select
 import sys
+from collections.abc import Callable
 
 from posed.cli.connection import PACKAGE, require_daemon
 from posed.cli.options import RATE_MODES, positive_count
 from posed.cli.sensors import short_name, unit
-from posed.cli.watch import SOURCE_ENDED, Silence, exit_on_signals
+from posed.cli.watch import Silence, exit_on_signals, tell_end
 from posed.client import SENSOR_STATUS_ACCURACY_HIGH, Sensor, SensorEvent, SensorManager, TriggerEvent
 from posed.client.sensor import period_of_delay_us
 from posed.errors import InvalidArgumentError, PosedError
@@ -46,14 +47,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     parser.epilog = """\
 Another client's faster registration of the same sensor sets the rate for all, as in Android. A one-shot sensor is
-waited for, and its event ends the command.
+waited for, and its event ends the command; so does the end of the recording that a daemon replays: exit code 1 if no
+event of it came, else 0.
 
 Keys of --json: sensor (its type), handle, timestamp_ns (sample time), values (in the sensor's unit), accuracy
 (Android's SENSOR_STATUS, -1 to 3)."""
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print events until Ctrl-C, --count or the end of the reader."""
+    """Print events until Ctrl-C, --count, or the end of the reader or of the recording."""
     require_daemon()
     exit_on_signals()
     try:
@@ -65,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
                 arguments.count = 1
             elif not manager.register_listener(listener, sensor, arguments.rate, arguments.latency):
                 raise PosedError(f"the daemon refused a listener for {short_name(sensor)}; see 'posed status'")
-            _print_events(listener, arguments.count, arguments.json)
+            _print_events(listener, arguments.count, arguments.json, lambda: manager.flush(listener))
         if listener.dropped:
             print(f"posed: {listener.dropped} events were dropped: they were not read in time", file=sys.stderr)
     except KeyboardInterrupt:
@@ -120,11 +122,13 @@ class _Listener:
         self.on_sensor_changed(SensorEvent(event.sensor, event.timestamp, event.values, SENSOR_STATUS_ACCURACY_HIGH))
 
 
-def _print_events(listener: _Listener, count: int | None, as_json: bool) -> None:
+def _print_events(listener: _Listener, count: int | None, as_json: bool, flush: Callable[[], object]) -> None:
+    """Print until `count` events, or the reader or the recording ends: then what a batch still holds is flushed."""
     reader = select.poll()
     reader.register(sys.stdout, 0)
     silence = Silence()
     printed = 0
+    flushed = False
     while printed != count:
         try:
             event = listener.events.get(timeout=_TICK_S)
@@ -132,7 +136,11 @@ def _print_events(listener: _Listener, count: int | None, as_json: bool) -> None
             if reader.poll(0):
                 return
             if silence.is_the_end(False):
-                print(f"posed: {SOURCE_ENDED}", file=sys.stderr)
+                if flushed:
+                    tell_end(printed)
+                    return
+                flush()
+                flushed = True
             continue
         silence.is_the_end(True)
         print(event_json(event) if as_json else event_line(event), flush=True)

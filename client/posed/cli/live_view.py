@@ -86,7 +86,7 @@ class LiveView:
         """Return color and text that say where the daemon stands."""
         if state is ServiceState.CONNECTED:
             if self._pose is None:
-                return _DOUBTFUL, "connected; waiting for the first pose"
+                return _DOUBTFUL, self._end or "connected; waiting for the first pose"
             silent_ns = now_ns - self._pose.delivery.published_ns
             if silent_ns > STALE_AFTER_NS and self._end:
                 return _DOUBTFUL, self._end

@@ -17,13 +17,14 @@ from posed.cli.options import add_pose_rate_option, add_rate_mode_option, positi
 from posed.cli.pose_text import JSON_KEYS, pose_json, pose_line
 from posed.client import Pose, PoseClient, ServiceState
 from posed.client.pose import boot_time_ns
+from posed.errors import PosedError
 
 # How often the view is drawn though nothing came, so that the age and the state stay true.
 _TICK_S = 0.25
 # After so many without anything it is asked whether there is more to come.
 _SILENT_TICKS = 4
 
-SOURCE_ENDED = "the recording has ended, so nothing more comes; --loop of 'posed serve' repeats it"
+_SOURCE_ENDED = "the recording has ended, so nothing more comes; 'posed serve' and 'posed start' repeat it with --loop"
 # A frame takes 4 ms to draw; poses can come at 200 Hz.
 _FRAME_S = 0.1
 
@@ -36,14 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     parser.add_argument("--count", type=positive_count, metavar="N", help="end after N poses")
     parser.epilog = f"""\
-Waits while no daemon is there and goes on when it returns. Where stdout is no terminal, each pose is a line.
+Waits while no daemon is there and goes on when it returns. Where stdout is no terminal, each pose is a line. Lines, and
+what --count limits, end with the recording that a daemon replays: exit code 1 if no pose of it came, else 0.
 
 Keys of --json:
 {JSON_KEYS}"""
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show poses until Ctrl-C, --count or the end of the reader."""
+    """Show poses until Ctrl-C, --count, or the end of the reader or of the recording."""
     rate_mode = getattr(sdk, f"SENSOR_DELAY_{arguments.mode}")
     exit_on_signals()
     view = LiveView()
@@ -67,15 +69,22 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 class Silence:
-    """Finds out, once, that nothing comes because the daemon's source has ended."""
+    """Finds out that nothing comes because the daemon's source has ended."""
 
     def __init__(self) -> None:
         self._ticks = 0
 
     def is_the_end(self, heard: bool) -> bool:
-        """Return True if the source has ended and that was not known yet; asked at every tick and everything heard."""
+        """Return True if the source has ended; asked at every tick and everything heard, it looks once a second."""
         self._ticks = 0 if heard else self._ticks + 1
-        return self._ticks == _SILENT_TICKS and source_has_ended()
+        return self._ticks > 0 and self._ticks % _SILENT_TICKS == 0 and source_has_ended()
+
+
+def tell_end(printed: int) -> None:
+    """Say on stderr that the recording has ended; raises PosedError if nothing of it came."""
+    if not printed:
+        raise PosedError(_SOURCE_ENDED)
+    print(f"posed: {_SOURCE_ENDED}", file=sys.stderr)
 
 
 def exit_on_signals() -> None:
@@ -85,7 +94,10 @@ def exit_on_signals() -> None:
 
 
 def draw_poses(client: PoseClient, view: LiveView, *, count: int | None = None, seconds: float | None = None) -> None:
-    """Draw the view on the terminal until `count` poses or `seconds` have passed."""
+    """Draw the view on the terminal until `count` poses or `seconds` have passed.
+
+    At the end of a recording the last pose stays, unless `count` poses were asked for: there will not be so many.
+    """
 
     def picture() -> None:
         live.update(view.render(client.state, client.reason, boot_time_ns(), live.console.width), refresh=True)
@@ -93,11 +105,17 @@ def draw_poses(client: PoseClient, view: LiveView, *, count: int | None = None, 
     with Live(console=Console(), auto_refresh=False) as live:
         next_frame = 0.0
         silence = Silence()
+        shown = 0
         for pose in _poses(client, count, seconds):
             if pose is not None:
                 view.add(pose)
-            if silence.is_the_end(pose is not None):
-                view.note_end(SOURCE_ENDED)
+                shown += 1
+            if silence.is_the_end(_is_news(client, pose)):
+                view.note_end(_SOURCE_ENDED)
+                if count is not None:
+                    picture()
+                    tell_end(shown)
+                    return
             now = time.monotonic()
             if pose is None or now >= next_frame:
                 picture()
@@ -112,24 +130,32 @@ def print_poses(
     count: int | None = None,
     seconds: float | None = None,
 ) -> None:
-    """Print each pose as a line until `count` poses or `seconds` have passed or the reader goes.
+    """Print each pose as a line until `count` poses or `seconds` have passed, or the recording or the reader ends.
 
-    What happens to the daemon is told on stderr.
+    What happens to the daemon is told on stderr. Raises PosedError if the recording has ended and no pose came.
     """
     reader = select.poll()
     reader.register(sys.stdout, 0)
     told = ServiceState.CONNECTED
     silence = Silence()
+    printed = 0
     for pose in _poses(client, count, seconds):
-        if silence.is_the_end(pose is not None):
-            print(f"posed: {SOURCE_ENDED}", file=sys.stderr)
+        if silence.is_the_end(_is_news(client, pose)):
+            tell_end(printed)
+            return
         if client.state is not told:
             told = client.state
             print(f"posed: {state_words(told, client.reason)}", file=sys.stderr)
         if pose is not None:
             print(text_of(pose), flush=True)
+            printed += 1
         elif reader.poll(0):
             return  # a pipe without its reader would only be noticed at the next pose
+
+
+def _is_news(client: PoseClient, pose: Pose | None) -> bool:
+    """Return whether it is known why there is a pose, or none."""
+    return pose is not None or client.state is not ServiceState.CONNECTED
 
 
 def _poses(client: PoseClient, count: int | None, seconds: float | None) -> Iterator[Pose | None]:
