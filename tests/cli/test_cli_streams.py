@@ -153,6 +153,15 @@ def test_the_live_view_of_a_recording_that_ended_stays_unless_poses_are_counted(
     assert watch.wait(20) == 0
 
 
+def test_a_filter_that_does_not_run_is_answered_with_those_that_do(shell: Shell) -> None:
+    shell.run("start", "--filter=dcm,dcm-adaptive")
+    assert shell.run("watch", "--filter=dcm-adaptive", "--count=1").returncode == 0
+    for more in ([], ["--json"]):
+        watched = shell.run("watch", "--filter=vqf", *more)
+        assert (watched.returncode, watched.stdout) == (1, "")
+        assert watched.stderr == "posed: error: the daemon runs no filter 'vqf'; it runs dcm, dcm-adaptive\n"
+
+
 def test_sensors(shell: Shell) -> None:
     shell.run("start")
     sensors = {sensor["string_type"]: sensor for sensor in json.loads(shell.run("sensors", "--json").stdout)}

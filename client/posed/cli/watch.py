@@ -11,13 +11,15 @@ from rich.console import Console
 from rich.live import Live
 
 import posed.client as sdk
-from posed.cli.connection import source_has_ended
+from posed.cli.connection import connect, service_manager, source_has_ended
 from posed.cli.live_view import LiveView, state_words
 from posed.cli.options import add_pose_rate_option, add_rate_mode_option, positive_count
 from posed.cli.pose_text import JSON_KEYS, pose_json, pose_line
 from posed.client import Pose, PoseClient, ServiceState
+from posed.client.launcher import daemon_listens
 from posed.client.pose import boot_time_ns
-from posed.errors import PosedError
+from posed.errors import InvalidArgumentError, PosedError
+from posed.proto import binder_pb2
 
 # How often the view is drawn though nothing came, so that the age and the state stay true.
 _TICK_S = 0.25
@@ -48,6 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Show poses until Ctrl-C, --count, or the end of the reader or of the recording."""
     rate_mode = getattr(sdk, f"SENSOR_DELAY_{arguments.mode}")
     exit_on_signals()
+    if arguments.filter is not None and daemon_listens():
+        _require_filter(arguments.filter)
     view = LiveView()
     try:
         with PoseClient(
@@ -66,6 +70,14 @@ def run(arguments: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         pass
     return 0
+
+
+def _require_filter(name: str) -> None:
+    """Raise InvalidArgumentError unless the running daemon has the filter."""
+    with connect() as connection:
+        running: list[str] = service_manager(connection).getStatus(binder_pb2.Empty()).filter.split(",")
+    if name not in running:
+        raise InvalidArgumentError(f"the daemon runs no filter {name!r}; it runs {', '.join(running)}")
 
 
 class Silence:
