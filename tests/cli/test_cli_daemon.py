@@ -163,8 +163,19 @@ def test_what_keeps_a_daemon_from_starting_is_said(shell: Shell, option: str, wo
     assert (served.returncode, served.stderr.count("\n")) == (1, 1)
     assert served.stderr.startswith(f"posed: error: {words}")
     started = shell.run("start", option)
-    assert started.returncode == cli.EX_UNAVAILABLE
+    assert started.returncode == 1
     assert started.stderr.startswith(f"posed: error: the daemon did not start: {words}")
+
+
+def test_a_daemon_that_ends_without_a_word_is_unavailable(
+    shell: Shell, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Only the daemon that another process starts is told where to say that it is ready.
+    (tmp_path / "sitecustomize.py").write_text("import os\n'NOTIFY_SOCKET' in os.environ and os._exit(3)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    started = shell.run("start")
+    assert started.returncode == cli.EX_UNAVAILABLE
+    assert started.stderr == "posed: error: the daemon did not start: it said nothing\n"
 
 
 def test_the_systemd_unit_names_a_command_that_exists() -> None:

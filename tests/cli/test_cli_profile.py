@@ -329,7 +329,7 @@ def test_a_command_that_does_not_run_is_said(tmp_path: Path, command: list[str],
 
 def test_a_daemon_that_does_not_start_is_said(tmp_path: Path) -> None:
     done = _profile(tmp_path, "--source", "replay:/does/not/exist.csv")
-    assert done.returncode == 69
+    assert done.returncode == 1
     assert "did not start: /does/not/exist.csv cannot be read" in done.stderr
 
 

@@ -3,8 +3,8 @@
 A subcommand's module has `add_arguments(parser)` and `run(arguments) -> int`, which returns the exit code.
 
 Exit codes: 0 done; 1 an error that one line on stderr explains; 2 usage; 3 `posed status` found no daemon; 65
-`posed evaluate` could not read some of the trials (EX_DATAERR); 69 the daemon is not there or does not answer
-(EX_UNAVAILABLE); 75 another daemon runs already (EX_TEMPFAIL).
+`posed evaluate` could not read some of the trials (EX_DATAERR); 69 the daemon is not there, did not come up or does not
+answer (EX_UNAVAILABLE); 75 another daemon runs already (EX_TEMPFAIL).
 """
 
 import argparse

@@ -15,7 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_daemon_options(parser)
     parser.epilog = """\
 Returns when the daemon is ready. One that runs already keeps its options; it is told to stay when its last client
-leaves. The daemon's log is daemon.log in the runtime directory ($XDG_RUNTIME_DIR/posed)."""
+leaves. The daemon's log is daemon.log in the runtime directory ($XDG_RUNTIME_DIR/posed).
+
+Exit codes: 0 it runs; 1 it refused to start, and said why; 69 it crashed, was not ready in time or does not answer."""
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -13,16 +13,19 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from posed.binder import runtime
-from posed.errors import ServiceUnavailableError
+from posed.errors import PosedError, ServiceUnavailableError
 
 _READY_TIMEOUT_S = 10.0
 _LOG_NAME = "daemon.log"
+# How a daemon's last line begins if it refused to start; after a crash it is another.
+_REFUSAL = "posed: error: "
 
 
 def ensure_daemon(arguments: Sequence[str] = ("--bound",)) -> bool:
     """Start `posed serve` with these arguments unless a daemon runs; return whether one was started.
 
-    Returns once it is ready. Raises ServiceUnavailableError with the daemon's own last words if it does not come up.
+    Returns once it is ready. Raises PosedError with the daemon's own words if it refused to start, for its options for
+    example, ServiceUnavailableError if it crashed or is not ready in time.
     """
     directory = runtime.runtime_directory()
     with _start_lock(directory):
@@ -48,6 +51,12 @@ def daemon_listens() -> bool:
         except BlockingIOError:
             pass  # a daemon that accepts nobody at the moment
     return True
+
+
+def start_error(name: str, last_line: str) -> PosedError:
+    """Return the error for a daemon that ended before it was ready: ServiceUnavailableError unless it refused."""
+    kind = PosedError if last_line.startswith(_REFUSAL) else ServiceUnavailableError
+    return kind(f"{name} did not start: {last_line.removeprefix(_REFUSAL)}")
 
 
 @contextlib.contextmanager
@@ -114,8 +123,8 @@ def _await_ready(ready: socket.socket, alive: int, log_path: Path) -> None:
             if _another_came_first():
                 return
             said = log_path.read_text(errors="replace").strip().splitlines()
-            why = said[-1].removeprefix("posed: error: ") if said else "it said nothing"
-            raise ServiceUnavailableError(f"the daemon did not start: {why}")
+            last = said[-1] if said else "it said nothing"
+            raise start_error("the daemon", last)
     raise ServiceUnavailableError(f"the daemon was not ready after {_READY_TIMEOUT_S:.0f} s; its log is {log_path}")
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 
 from posed.cli.connection import connect, sensor_service, service_manager
-from posed.client.launcher import daemon_listens
+from posed.client.launcher import daemon_listens, start_error
 from posed.errors import ServiceUnavailableError
 from posed.proto import binder_pb2, sensors_pb2
 
@@ -121,9 +121,7 @@ class PrivateDaemon(Daemon):
                 if self._process.poll() is not None:
                     said = self._log.read_text(errors="replace").strip().splitlines()
                     why = said[-1] if said else f"exit code {self._process.returncode}"
-                    raise ServiceUnavailableError(
-                        f"the daemon to be measured did not start: {why.removeprefix('posed: error: ')}"
-                    )
+                    raise start_error("the daemon to be measured", why)
                 if time.monotonic() > deadline:
                     raise ServiceUnavailableError(
                         f"the daemon to be measured was not ready after {_READY_TIMEOUT_S:.0f} s"
