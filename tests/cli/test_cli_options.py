@@ -8,6 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posed.cli import events, options
+from posed.cli.pose_text import status_words
+from posed.client import PoseStatus
+from posed.fusion import FILTERS, PACKAGED
 
 
 def _parse(*words: str) -> dict[str, object]:
@@ -19,6 +22,21 @@ def _parse(*words: str) -> dict[str, object]:
 def test_an_option_not_given_leaves_nothing_behind() -> None:
     assert _parse() == {}
     assert _parse("--loop", "--seed=3") == {"loop": True, "seed": 3}
+
+
+def test_the_filters_of_the_help_and_of_the_readme_are_those_there_are() -> None:
+    there_are = sorted({*FILTERS, *PACKAGED})
+    assert sorted(options.FILTER_NAMES.split(", ")) == there_are
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    told = readme.partition("**Filters** for `--filter`:")[2].partition("\n\n")[0]
+    assert [name for name in there_are if f"`{name}`" not in told] == []
+
+
+def test_the_readme_explains_every_status() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    names = [name.replace("_", " ") for status in PoseStatus for name in status_words(status)]
+    assert len(names) == 9
+    assert [name for name in names if f"\n| {name} | " not in readme] == []
 
 
 def test_paths_become_absolute(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -7,6 +7,9 @@ from typing import Any
 
 RATE_MODES = ("NORMAL", "UI", "GAME", "FASTEST")
 
+FILTER_NAMES = "dcm-adaptive, dcm, dcm-literal, game, geomag, vqf, imufusion"
+"""Written down for the help alone, so that a daemon reads its options before it has numpy."""
+
 _DAEMON_OPTIONS = ("source", "profile", "filters", "seed", "speed", "loop", "position", "aligned", "log_format")
 
 
@@ -55,7 +58,7 @@ def add_filters_option(parser: "argparse._ActionsContainer", default: Any = argp
         type=_filters,
         default=default,
         metavar="NAME,NAME",
-        help="orientation filters, one or several side by side (default: dcm-adaptive)",
+        help=f"orientation filters, one or several side by side, of {FILTER_NAMES} (default: dcm-adaptive)",
     )
 
 

@@ -13,7 +13,7 @@ from rich.live import Live
 import posed.client as sdk
 from posed.cli.connection import connect, service_manager, source_has_ended
 from posed.cli.live_view import LiveView, state_words
-from posed.cli.options import add_pose_rate_option, add_rate_mode_option, positive_count
+from posed.cli.options import FILTER_NAMES, add_pose_rate_option, add_rate_mode_option, positive_count
 from posed.cli.pose_text import JSON_KEYS, pose_json, pose_line
 from posed.client import Pose, PoseClient, ServiceState
 from posed.client.launcher import daemon_listens
@@ -35,7 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to ask for and how to show it."""
     add_rate_mode_option(parser)
     add_pose_rate_option(parser)
-    parser.add_argument("--filter", metavar="NAME", help="which of the daemon's filters (default: its first)")
+    parser.add_argument(
+        "--filter", metavar="NAME", help=f"which of the daemon's filters, of {FILTER_NAMES} (default: its first)"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     parser.add_argument("--count", type=positive_count, metavar="N", help="end after N poses")
     parser.epilog = f"""\
