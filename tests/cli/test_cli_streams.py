@@ -218,6 +218,16 @@ def test_an_unknown_sensor_is_answered_with_the_list(shell: Shell) -> None:
     assert asked.stderr.count("\n") == 1
 
 
+def test_a_heading_without_a_position_is_answered_with_what_it_needs(shell: Shell) -> None:
+    shell.run("start")
+    asked = shell.run("events", "heading")
+    assert (asked.returncode, asked.stderr.count("\n")) == (1, 1)
+    assert asked.stderr.endswith("; heading needs --position of 'posed serve' or 'posed start'\n")
+    shell.run("stop")
+    shell.run("start", "--position=40.6,22.9,60")
+    assert shell.run("events", "heading", "--count=1").returncode == 0
+
+
 def test_a_demo_leaves_nothing_behind_and_the_users_daemon_alone(shell: Shell) -> None:
     shell.run("start")
     ran = shell.run("demo", "--seconds=2")

@@ -81,7 +81,10 @@ def find_sensor(wanted: str, sensors: list[Sensor]) -> Sensor:
         if wanted.lower() in (short_name(sensor), sensor.string_type, str(sensor.handle)):
             return sensor
     known = ", ".join(short_name(sensor) for sensor in sensors)
-    raise InvalidArgumentError(f"there is no sensor {wanted!r}; there are {known}")
+    hint = ""
+    if wanted.lower().removeprefix("android.sensor.") == "heading":
+        hint = "; heading needs --position of 'posed serve' or 'posed start'"
+    raise InvalidArgumentError(f"there is no sensor {wanted!r}; there are {known}{hint}")
 
 
 def event_json(event: SensorEvent) -> str:
