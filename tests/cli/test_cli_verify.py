@@ -3,6 +3,7 @@
 import dataclasses
 
 import pytest
+from cli_shell import Shell
 
 from posed.cli.verify import _rate_table
 from posed.client import Sensor
@@ -28,3 +29,14 @@ def test_no_rates_bind_where_the_profile_is_not_known(capsys: pytest.CaptureFixt
     sensor = Sensor(**{**_OF_NONE, "handle": 6})  # type: ignore[arg-type]
     assert _rate_table("no-such-phone")(sensor) == ()
     assert "give one with --profile" in capsys.readouterr().err
+
+
+def test_off_a_terminal_stderr_tells_how_far_it_is_and_no_refusal_that_was_wanted(shell: Shell) -> None:
+    shell.run("start")
+    verified = shell.run("verify", "--sensors=significant_motion,light", "--rates=50", "--seconds=0.5")
+    assert "OneShot" in verified.stdout
+    told = verified.stderr.splitlines()
+    assert all(line.startswith("posed: verifying ") for line in told), told
+    assert told[0] == "posed: verifying sensor list"
+    assert told[-2:] == ["posed: verifying calls of significant_motion", "posed: verifying calls of light"]
+    assert len(set(told)) == len(told)

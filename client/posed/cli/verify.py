@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import logging
 import math
 import sys
 import time
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from posed.client import Sensor, SensorManager
     from posed.verify.finding import Finding
     from posed.verify.matrix import Conditions
+    from posed.verify.suite import Step
     from posed.verify.truth import Attitude
 
 _QUICK_RATES_HZ = (0.0, 50.0, 5.0)
@@ -62,9 +64,9 @@ def run(arguments: argparse.Namespace) -> int:
         sensors = _chosen(arguments.sensors, manager.get_sensor_list())
         conditions = _conditions(arguments, manager)
         todo = list(steps(manager, BootClock(), sensors, rates_hz, conditions, _listen_to_truth))
-        with _progress(len(todo)) as progress:
+        with _progress(len(todo)) as progress, _refusals_unsaid():
             for step in todo:
-                progress(step.name)
+                progress(step)
                 findings += step.run()
     seconds = time.monotonic() - begun
     if arguments.junit is not None:
@@ -145,10 +147,29 @@ def _rate_table(name: str | None) -> "Callable[[Sensor], tuple[float, ...]]":
 
 
 @contextlib.contextmanager
-def _progress(steps: int) -> Iterator[Callable[[str], None]]:
-    """Yield what to tell of each step; it shows on stderr if that is a terminal."""
+def _refusals_unsaid() -> Iterator[None]:
+    """Keep off stderr what the client says of calls that the suite makes to see them refused."""
+    log = logging.getLogger("posed.client.sensor_manager")
+    log.disabled = True
+    try:
+        yield
+    finally:
+        log.disabled = False
+
+
+@contextlib.contextmanager
+def _progress(steps: int) -> "Iterator[Callable[[Step], None]]":
+    """Yield what to tell of each step; on stderr it shows as a bar, or off a terminal as a line a group of steps."""
     if not sys.stderr.isatty():
-        yield lambda doing: None
+        told = ""
+
+        def say(step: "Step") -> None:
+            nonlocal told
+            if step.group != told:
+                told = step.group
+                print(f"posed: verifying {told}", file=sys.stderr)
+
+        yield say
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
@@ -158,9 +179,9 @@ def _progress(steps: int) -> Iterator[Callable[[str], None]]:
         task = bar.add_task("", total=steps)
         begun = 0
 
-        def tell(doing: str) -> None:
+        def tell(step: "Step") -> None:
             nonlocal begun
-            bar.update(task, completed=begun, description=doing)
+            bar.update(task, completed=begun, description=step.name)
             begun += 1
 
         yield tell

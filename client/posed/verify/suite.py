@@ -21,6 +21,8 @@ class Step:
 
     name: str
     run: Callable[[], Sequence[Finding]]
+    group: str
+    """What several steps in a row have in common, for who wants to be told less."""
 
 
 def steps(
@@ -32,15 +34,16 @@ def steps(
     listen: TruthStream | None = None,
 ) -> Iterator[Step]:
     """Yield the steps of the suite for these sensors: the list, the matrix, the truth, then the behaviours of each."""
-    yield Step("sensor list", partial(verify_sensor_list, list(sensors)))
+    yield Step("sensor list", partial(verify_sensor_list, list(sensors)), "sensor list")
     for point in points(sensors, rates_hz):
-        yield Step(point.name, partial(run_point, source, clock, point, conditions or Conditions()))
+        yield Step(point.name, partial(run_point, source, clock, point, conditions or Conditions()), point.name)
     if listen is not None:
-        yield Step("against the truth", partial(run_against_truth, source, clock, sensors, listen, _TRUTH_S))
+        against_truth = partial(run_against_truth, source, clock, sensors, listen, _TRUTH_S)
+        yield Step("against the truth", against_truth, "against the truth")
     for sensor in sensors:
         for name, verify in Behaviour(source, clock, sensor).verifications().items():
             subject = sensor.string_type.removeprefix("android.sensor.")
-            yield Step(f"{name} {subject}", partial(_listed, verify))
+            yield Step(f"{name} {subject}", partial(_listed, verify), f"calls of {subject}")
 
 
 def _listed(verify: Callable[[], Iterator[Finding]]) -> list[Finding]:
