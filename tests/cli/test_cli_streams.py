@@ -171,10 +171,12 @@ def test_sensors(shell: Shell) -> None:
     explained = shell.run("sensors", "--help").stdout
     assert [key for key in gyroscope if key not in explained] == []
 
-    table = shell.run("sensors").stdout
-    assert max(map(len, table.splitlines())) <= 80
-    for string_type in sensors:
-        assert string_type.removeprefix("android.sensor.") in table
+    heading, *lines = shell.run("sensors").stdout.splitlines()
+    assert heading.split()[:2] == ["#", "type"]
+    assert [line.split()[1] for line in lines] == [each.removeprefix("android.sensor.") for each in sensors]
+    assert all(
+        f"{sensor['name']}, {sensor['vendor']}" in line for sensor, line in zip(sensors.values(), lines, strict=True)
+    )
 
 
 @pytest.mark.parametrize("name", ["gyroscope", "GYROSCOPE", "android.sensor.gyroscope", "4"])

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 
 from rich.console import Console
@@ -10,6 +11,7 @@ from rich.table import Table
 from posed.cli.connection import PACKAGE, require_daemon
 from posed.client import Sensor, SensorManager
 
+_WIDE = 1000
 _UNITS = {
     Sensor.TYPE_ACCELEROMETER: "m/s²",
     Sensor.TYPE_ACCELEROMETER_UNCALIBRATED: "m/s²",
@@ -45,7 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps([asdict(sensor) for sensor in sensors], indent=2))
     else:
-        Console(highlight=False, markup=False).print(_table(sensors))
+        # Off a terminal no width is too much, and a sensor stays one line for who reads lines.
+        width = None if sys.stdout.isatty() else _WIDE
+        Console(highlight=False, markup=False, width=width).print(_table(sensors))
     return 0
 
 
