@@ -49,6 +49,7 @@ cdef class AdaptiveFilter:
     @cython.locals(s=AdaptiveState, held=HeldEvents, newest=cython.longlong, norm2=double, largest=double)
     cdef void _take(self, long long sensor_type, long long t, double x, double y, double z) noexcept
     cdef void _see(self, long long t) noexcept
+    cdef void _believe(self, long long t) noexcept
     @cython.locals(
         s=AdaptiveState, c=DirectionCosines, step=cython.longlong, dt=double, norm2=double, about_up=double, turning=bint,
     )

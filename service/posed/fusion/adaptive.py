@@ -200,11 +200,8 @@ class AdaptiveFilter:
         if t - s.newest_ns > _MAX_STEP_NS and not s.ahead:
             # A wrong stamp, or the first sample after a gap: the next one tells.
             s.ahead = True
-            s.flag_bad_sample()
             return
-        s.ahead = False
-        if t > s.newest_ns:
-            s.newest_ns = t
+        self._believe(t)
         if s.gyro_lost:
             self._measure_alone(sensor_type, t, x, y, z)
         else:
@@ -220,6 +217,15 @@ class AdaptiveFilter:
             s.has_time = True
             s.time_ns = s.start_ns = s.first_ns = s.newest_ns = t
             s.gyro_lost = not self._use_gyroscope
+
+    def _believe(self, t: int) -> None:
+        """Take a stamp for right; one far ahead that came just before it was wrong, unless this one is as far."""
+        s = self.state
+        if s.ahead and t - s.newest_ns <= _MAX_STEP_NS:
+            s.flag_bad_sample()
+        s.ahead = False
+        if t > s.newest_ns:
+            s.newest_ns = t
 
     def _take_rate(self, t: int, x: float, y: float, z: float) -> None:
         s = self.state
@@ -242,9 +248,7 @@ class AdaptiveFilter:
                 # A turn about the vertical leaves the accelerometer as it is.
                 s.acc_repeats.moved_s += dt
             s.mag_repeats.moved_s += dt
-        s.ahead = False
-        if t > s.newest_ns:
-            s.newest_ns = t
+        self._believe(t)
         step = t - s.time_ns
         if step > _MAX_STEP_NS or step < -_MAX_STEP_NS:
             # Far back counts as a gap too: a source whose clock was set back must not lock the filter out.
