@@ -49,7 +49,7 @@ class Manager(Stub):
         return service_manager_pb2.ServiceInfo(boot_id=b"0123456789abcdef")
 
     def bindService(self, request: Any, caller: Caller) -> Any:
-        caller.peer.link_to_death(lambda: self.died.put(caller.pid))
+        caller.peer.link_to_death(lambda peer: self.died.put(peer.pid))
         self.bound.put(caller)
         return EMPTY
 
@@ -130,8 +130,11 @@ class Listener(Stub):
             raise self.error
 
 
-def events(sequence: int, dropped: int = 0) -> Any:
-    return events_pb2.SensorEvents(header=events_pb2.DeliveryHeader(sequence=sequence), events_dropped=dropped)
+def events(sequence: int, dropped: int = 0, flushes: int = 0) -> Any:
+    """A message without events; each flush-complete makes it a byte longer."""
+    return events_pb2.SensorEvents(
+        header=events_pb2.DeliveryHeader(sequence=sequence), events_dropped=dropped, flush_completes=[1] * flushes
+    )
 
 
 class ServerThread:

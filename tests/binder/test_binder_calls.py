@@ -159,9 +159,15 @@ def test_reply_too_large_is_an_exception(server: ServerThread, connection: Conne
 
 
 def test_callback_too_large_is_not_sent(server: ServerThread, connection: Connection) -> None:
-    listener = server.peers()[0].proxy(LISTENER, "x" * MAX_PARCEL_BYTES)
+    listener = server.peers()[0].proxy(LISTENER, "listener")
     with pytest.raises(TransactionTooLargeError, match="65536"):
-        listener.onSensorEvents(events(1))
+        listener.onSensorEvents(events(1, flushes=MAX_PARCEL_BYTES))
+
+
+@pytest.mark.parametrize("name", ["", "x" * 256])
+def test_callback_object_needs_a_name_that_leaves_room(server: ServerThread, connection: Connection, name: str) -> None:
+    with pytest.raises(InvalidArgumentError, match=f"has {len(name)} characters; give 1 to 255"):
+        server.peers()[0].proxy(LISTENER, name)
 
 
 def test_timeout_then_the_late_reply_is_nobody_elses(server: ServerThread, connection: Connection) -> None:
@@ -317,7 +323,7 @@ def test_call_without_a_daemon_fails_at_once(unconnected: Connection) -> None:
     with pytest.raises(DeadObjectError):
         unconnected.proxy(LISTENER, "listener").onSensorEvents(events(1))
     with pytest.raises(DeadObjectError):
-        unconnected.link_to_death(lambda: None)
+        unconnected.link_to_death(lambda _: None)
 
 
 def test_fork_cannot_use_its_parents_connection(server: ServerThread) -> None:

@@ -25,6 +25,7 @@ from binder_harness import (
 
 from posed.binder import sockets
 from posed.binder.connection import Connection
+from posed.binder.peer import Peer
 from posed.binder.server import Server
 from posed.binder.status import DeadObjectError
 from posed.proto import binder_pb2, sensors_pb2, service_manager_pb2
@@ -77,17 +78,18 @@ def test_stopped_client_hears_of_the_loss_and_then_of_the_return(server: ServerT
 def test_recipients_are_called_once_each(server: ServerThread, connection: Connection) -> None:
     calls: list[str] = []
 
-    def first() -> None:
+    def first(dead: Peer) -> None:
+        assert dead is peer
         calls.append("first")
 
-    def failing() -> None:
+    def failing(_: Peer) -> None:
         calls.append("failing")
         raise ZeroDivisionError
 
-    def unlinked() -> None:
+    def unlinked(_: Peer) -> None:
         calls.append("unlinked")
 
-    def last() -> None:
+    def last(_: Peer) -> None:
         calls.append("last")
 
     (peer,) = server.peers()
@@ -173,13 +175,13 @@ def test_death_of_the_daemon_reaches_recipients_then_on_disconnected(
 ) -> None:
     order: list[str] = []
 
-    def unlinked() -> None:
+    def unlinked(_: Peer) -> None:
         order.append("unlinked")
 
     with running("server", socket_path, "ready") as daemon:
         pump(unconnected, lambda: unconnected.connected)
         unconnected.on_disconnected = lambda: order.append("disconnected")
-        unconnected.link_to_death(lambda: order.append("died"))
+        unconnected.link_to_death(lambda _: order.append("died"))
         unconnected.link_to_death(unlinked)
         assert unconnected.unlink_to_death(unlinked)
         daemon.kill()

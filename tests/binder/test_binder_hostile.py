@@ -242,11 +242,11 @@ def test_client_that_does_not_read_is_told_off_not_waited_for(server: ServerThre
     sleeper.send(PING)
     server.wait_until(lambda server: len(server.peers) == 2)
     asleep = next(peer for peer in server.peers() if peer.id != victim_of(connection, server))
-    listener = asleep.proxy(LISTENER, "l" * 60_000)
+    listener = asleep.proxy(LISTENER, "listener")
 
     def fill(_server: object) -> int:
         sent = 0
-        while sent < 10_000 and listener.onSensorEvents(events(sent)):
+        while sent < 10_000 and listener.onSensorEvents(events(sent, flushes=60_000)):
             sent += 1
         return sent
 

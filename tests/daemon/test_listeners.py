@@ -118,6 +118,24 @@ def test_one_that_does_not_read_holds_nobody_up(make_listeners: Callable[[], Any
     assert (len(stuck.times), len(sound.times)) == (0, 10)
 
 
-def test_a_listener_needs_a_name(make_listeners: Callable[[], Any]) -> None:
-    with pytest.raises(InvalidArgumentError, match="names no listener"):
-        make_listeners().find_or_add(Reader().peer, "", Client())
+@pytest.mark.parametrize(("name", "said"), [("", "'' .* 0 characters"), ("x" * 256, "'x{40}' .* 256 characters")])
+def test_a_listener_needs_a_name_that_leaves_room_for_its_events(
+    make_listeners: Callable[[], Any], name: str, said: str
+) -> None:
+    listeners = make_listeners()
+    with pytest.raises(InvalidArgumentError, match=said):
+        listeners.find_or_add(Reader().peer, name, Client())
+    assert list(listeners) == []
+
+
+def test_the_longest_name_leaves_room_for_the_fullest_message(make_listeners: Callable[[], Any]) -> None:
+    listeners, reader = make_listeners(), Reader()
+    listener = listeners.find_or_add(reader.peer, "\U0001f4f1" * 255, Client())
+    for _ in range(1000):
+        listener.connection.append_flush_complete(1)
+    # Times as they are: nanoseconds of days, irregular.
+    times = np.cumsum(np.arange(5_000_001, 5_000_801, dtype=np.int64)) + 10**15
+    listener.connection.append(1, EventColumn(times, np.ones((800, 16)), np.full(800, 3, np.int8)))
+    listeners.deliver(_header)
+    assert listener.events_sent == 800
+    assert listener.connection.events_dropped == 0

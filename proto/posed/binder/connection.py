@@ -87,11 +87,14 @@ class Connection:
         """Return when the daemon has answered; raises DeadObjectError or TransactionTimeoutError."""
         self.call("servicemanager", PING, b"", timeout_s)
 
-    def link_to_death(self, recipient: Callable[[], None]) -> None:
-        """Have `recipient` called once when this connection is lost; raises DeadObjectError if it is not connected."""
+    def link_to_death(self, recipient: Callable[[Peer], None]) -> None:
+        """Have `recipient` called once, with the daemon, when this connection is lost.
+
+        Raises DeadObjectError if it is not connected.
+        """
         self._live_daemon().link_to_death(recipient)
 
-    def unlink_to_death(self, recipient: Callable[[], None]) -> bool:
+    def unlink_to_death(self, recipient: Callable[[Peer], None]) -> bool:
         """Undo link_to_death; False if the recipient was not linked or the connection it was linked to is lost."""
         return self._daemon is not None and self._daemon.unlink_to_death(recipient)
 

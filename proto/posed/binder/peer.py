@@ -9,8 +9,12 @@ from posed.binder.interface import interface_of
 from posed.binder.parcel import encode_transaction
 from posed.binder.proxy import Proxy
 from posed.binder.status import DeadObjectError, ExceptionCode, RemoteError
+from posed.errors import InvalidArgumentError
 
 _log = logging.getLogger(__name__)
+
+# A name stands before every parcel to its object: a long one would leave a full message no room in 64 KiB.
+_LONGEST_NAME = 255
 
 
 class Peer:
@@ -22,13 +26,13 @@ class Peer:
         self.pid = pid
         self.alive = True
         self._send = send
-        self._recipients: list[Callable[[], None]] = []
+        self._recipients: list[Callable[[Peer], None]] = []
 
     def __repr__(self) -> str:
         return f"Peer(id={self.id.hex()}, uid={self.uid}, pid={self.pid}, alive={self.alive})"
 
-    def link_to_death(self, recipient: Callable[[], None]) -> None:
-        """Have `recipient` called once when the peer dies; linking it again changes nothing.
+    def link_to_death(self, recipient: "Callable[[Peer], None]") -> None:
+        """Have `recipient` called once, with the peer, when that dies; linking it again changes nothing.
 
         Raises DeadObjectError if the peer is dead already.
         """
@@ -37,7 +41,7 @@ class Peer:
         if recipient not in self._recipients:
             self._recipients.append(recipient)
 
-    def unlink_to_death(self, recipient: Callable[[], None]) -> bool:
+    def unlink_to_death(self, recipient: "Callable[[Peer], None]") -> bool:
         """Undo link_to_death; False if the recipient was not linked or has been called already."""
         if recipient not in self._recipients:
             return False
@@ -45,7 +49,14 @@ class Peer:
         return True
 
     def proxy(self, descriptor: ServiceDescriptor, target: str) -> Proxy:
-        """Return an object of the peer's, for its oneway calls."""
+        """Return an object of the peer's, for its oneway calls.
+
+        Raises InvalidArgumentError if the peer gave it no name, or one that is too long.
+        """
+        if not 0 < len(target) <= _LONGEST_NAME:
+            raise InvalidArgumentError(
+                f"the name {target[:40]!r} of a callback object has {len(target)} characters; give 1 to {_LONGEST_NAME}"
+            )
         return Proxy(interface_of(descriptor), target, self, timeout_s=0.0)
 
     def post(self, target: str, code: int, payload: bytes) -> bool:
@@ -64,6 +75,6 @@ class Peer:
         while self._recipients:
             recipient = self._recipients.pop(0)
             try:
-                recipient()
+                recipient(self)
             except Exception:
                 _log.exception("a death recipient of process %d failed", self.pid)

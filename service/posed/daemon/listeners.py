@@ -8,7 +8,7 @@ from posed.binder.peer import Peer
 from posed.binder.proxy import Proxy
 from posed.clock import Clock
 from posed.daemon import encoding
-from posed.errors import InvalidArgumentError, PosedError
+from posed.errors import PosedError
 from posed.proto import events_pb2, sensors_pb2
 from posed.sensors import Client, SensorEventConnection, SensorService
 
@@ -68,9 +68,7 @@ class Listeners:
         return self._listeners.get((peer, name))
 
     def find_or_add(self, peer: Peer, name: str, client: Client) -> Listener:
-        """Return a listener, a new one if need be; raises InvalidArgumentError if it has no name."""
-        if not name:
-            raise InvalidArgumentError("the request names no listener; give the name of its callback object")
+        """Return a listener, a new one if need be; raises InvalidArgumentError if it has no name, or a long one."""
         listener = self._listeners.get((peer, name))
         if listener is None:
             listener = Listener(peer, name, peer.proxy(_LISTENER, name), self._service.connect(client))

@@ -40,7 +40,6 @@ class ServiceManagerStub(Stub):
         self._config = config
         self._ready_ns = clock.now_ns()
         self._bindings: dict[Peer, Proxy | None] = {}
-        self._watched: set[Peer] = set()
 
     def announce_end(self, reason: str) -> None:
         """Tell every bound client that the daemon ends on purpose."""
@@ -59,11 +58,10 @@ class ServiceManagerStub(Stub):
 
     def bindService(self, request: service_manager_pb2.BindRequest, caller: Caller) -> binder_pb2.Empty:
         peer = caller.peer
+        connection = peer.proxy(_CONNECTION, request.connection) if request.connection else None
         self._clients.register(peer, request)
-        if peer not in self._watched:
-            self._watched.add(peer)
-            peer.link_to_death(lambda: self._peer_died(peer))
-        self._bindings[peer] = peer.proxy(_CONNECTION, request.connection) if request.connection else None
+        peer.link_to_death(self._peer_died)
+        self._bindings[peer] = connection
         self._lifecycle.bind(peer, request.auto_create)
         return binder_pb2.Empty()
 
@@ -102,7 +100,6 @@ class ServiceManagerStub(Stub):
         self._lifecycle.unbind(peer)
 
     def _peer_died(self, peer: Peer) -> None:
-        self._watched.discard(peer)
         self._clients.forget(peer)
         self._unbind(peer)
 

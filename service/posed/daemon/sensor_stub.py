@@ -44,7 +44,6 @@ class SensorServiceStub(Stub):
         self._dynamic_changes_told: dict[tuple[Peer, str], int] = {}
         """What each callback knows of, by the service's count of changes."""
         self._dumps: dict[Peer, str] = {}
-        self._watched: set[Peer] = set()
 
     @property
     def retry_s(self) -> float | None:
@@ -81,7 +80,7 @@ class SensorServiceStub(Stub):
 
     def enableSensor(self, request: sensors_pb2.EnableSensorRequest, caller: Caller) -> binder_pb2.Empty:
         listener = self._listeners.find_or_add(caller.peer, request.listener, self._clients.of(caller.peer))
-        self._watch(caller.peer)
+        caller.peer.link_to_death(self._peer_died)
         try:
             self._service.enable(
                 listener.connection,
@@ -113,11 +112,9 @@ class SensorServiceStub(Stub):
     def registerDynamicSensorCallback(
         self, request: sensors_pb2.DynamicSensorCallbackRequest, caller: Caller
     ) -> binder_pb2.Empty:
-        if not request.callback:
-            raise InvalidArgumentError("the request names no callback object; give its name")
-        self._watch(caller.peer)
         key = (caller.peer, request.callback)
         self._dynamic_callbacks[key] = caller.peer.proxy(_DYNAMIC_CALLBACK, request.callback)
+        caller.peer.link_to_death(self._peer_died)
         self._dynamic_changes_told.setdefault(key, self._service.dynamic_changes)
         return binder_pb2.Empty()
 
@@ -141,7 +138,7 @@ class SensorServiceStub(Stub):
 
         peer = caller.peer
         if request.offset == 0:
-            self._watch(peer)
+            peer.link_to_death(self._peer_died)
             traffic = {each.connection: Traffic(each.events_sent, each.events_cached) for each in self._listeners}
             self._dumps[peer] = dump(self._service, self._clock.now_ns(), time.time_ns(), traffic)
         text = self._dumps.get(peer, "")
@@ -195,13 +192,7 @@ class SensorServiceStub(Stub):
 
     # Private
 
-    def _watch(self, peer: Peer) -> None:
-        if peer not in self._watched:
-            self._watched.add(peer)
-            peer.link_to_death(lambda: self._peer_died(peer))
-
     def _peer_died(self, peer: Peer) -> None:
-        self._watched.discard(peer)
         self._dumps.pop(peer, None)
         self._listeners.forget_all_of(peer)
         for key in [key for key in self._dynamic_callbacks if key[0] is peer]:
