@@ -38,6 +38,18 @@ def test_a_day_of_a_daemon(shell: Shell) -> None:
     assert (again.returncode, again.stdout) == (0, "posed is not running\n")
 
 
+def test_a_daemon_that_cannot_open_its_second_socket_leaves_no_first(shell: Shell) -> None:
+    directory = shell.directory / "posed"
+    directory.mkdir(mode=0o700)
+    (directory / "pose.sock").write_text("precious")
+    served = shell.run("serve", "--source=sim:still")
+    assert served.returncode == 1
+    assert "pose.sock" in served.stderr
+    assert "Traceback" not in served.stderr
+    assert not (directory / "control.sock").exists()
+    assert (directory / "pose.sock").read_text() == "precious"
+
+
 def test_start_finds_a_daemon_and_leaves_its_options(shell: Shell) -> None:
     shell.run("start", "--source=sim:still")
     pid = shell.daemon_pid

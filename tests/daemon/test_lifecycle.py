@@ -66,3 +66,19 @@ def test_binding_twice_counts_once() -> None:
     assert life.bound_clients == 1
     life.unbind("a")
     assert life.over
+
+
+def test_it_knows_why_it_ends() -> None:
+    life = Lifecycle(started=False)
+    assert life.reason == "no client bound"
+    life.bind("a", auto_create=True)
+    life.unbind("a")
+    assert life.reason == "its last client unbound"
+    life.bind("b", auto_create=True)
+    life.stop()
+    life.unbind("b")
+    assert life.reason == "it was told to stop"
+    life.start()
+    assert not life.over
+    life.end()
+    assert life.reason == "it was told to stop"

@@ -11,6 +11,7 @@ class Lifecycle:
         self._bound: dict[Hashable, bool] = {}
         self._ended = False
         self._was_bound = False
+        self._was_told = False
 
     @property
     def bound_clients(self) -> int:
@@ -32,18 +33,26 @@ class Lifecycle:
         """True once the daemon must end."""
         return self._ended or (not self.started and self._was_bound and not self.keeping_clients)
 
+    @property
+    def reason(self) -> str:
+        """Why the daemon ends."""
+        if self._was_told:
+            return "it was told to stop"
+        return "its last client unbound" if self._was_bound else "no client bound"
+
     def start(self) -> None:
         """Note that the daemon was asked to stay."""
         self.started = True
+        self._was_told = False
 
     def stop(self) -> None:
         """Note that it was asked to go: it ends when no auto_create binding is left."""
         self.started = False
-        self._was_bound = True
+        self._was_bound = self._was_told = True
 
     def end(self) -> None:
         """End at once, whoever is bound."""
-        self._ended = True
+        self._ended = self._was_told = True
 
     def bind(self, client: Hashable, auto_create: bool) -> None:
         """Note a binding; a second one of the same client replaces the first."""

@@ -81,16 +81,21 @@ class _Daemon:
         self._context = context()
         self._server = Server(control_path(directory), self._context)
         statistics = PublicationStatistics()
-        self._publisher = PosePublisher(
-            pose_path(directory), self._context, self._boot_id, clock, self._source, statistics
-        )
+        try:
+            self._publisher = PosePublisher(
+                pose_path(directory), self._context, self._boot_id, clock, self._source, statistics
+            )
+        except BaseException:
+            self._server.close()
+            raise
         clients = ClientRegistry()
         self._sensors = SensorServiceStub(
             self._service, clients, clock, statistics, lambda: self._server.parcels_refused
         )
+        self._poses = PoseServiceStub(self._service, profile)
         services: dict[str, Stub] = {
             "sensorservice": self._sensors,
-            "poseservice": PoseServiceStub(self._service, profile),
+            "poseservice": self._poses,
         }
         self._manager = ServiceManagerStub(
             services, self._server.peers, self._lifecycle, clients, clock, self._boot_id, config
@@ -113,12 +118,14 @@ class _Daemon:
                 self._service.advance()
                 self._publisher.publish(self._service.take_poses())
                 self._sensors.deliver(self._header)
+                if self._poses.retry_s is not None:
+                    self._poses.tell()
                 deadline_ns = self._service.next_deadline_ns()
                 if self._lifecycle.awaits_first_bind:
                     if self._clock.now_ns() >= wait_for_bind_ns:
                         break
                     deadline_ns = min(deadline_ns or wait_for_bind_ns, wait_for_bind_ns)
-                for retry_s in (self._server.retry_s, self._sensors.retry_s):
+                for retry_s in (self._server.retry_s, self._sensors.retry_s, self._poses.retry_s):
                     if retry_s is not None:
                         retry_ns = self._clock.now_ns() + int(retry_s * 1e9)
                         deadline_ns = min(deadline_ns or retry_ns, retry_ns)
@@ -128,7 +135,7 @@ class _Daemon:
                     self._source.prepare()
                 if idle and self._waiter.wait(deadline_ns):
                     readable = self._waiter.readable()
-        reason = "it was told to stop" if self._signal is None else f"it got {signal.Signals(self._signal).name}"
+        reason = self._lifecycle.reason if self._signal is None else f"it got {signal.Signals(self._signal).name}"
         _log.info("stopping: %s", reason)
         sd_notify("STOPPING=1")
         self._manager.announce_end(f"the daemon ended because {reason}")

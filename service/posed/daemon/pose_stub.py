@@ -1,16 +1,26 @@
 """The object "poseservice": who wants poses, how often, and from how fast sensors."""
 
+from dataclasses import dataclass
 from typing import cast
 
 from posed.binder.peer import Peer
 from posed.binder.proxy import Proxy
 from posed.binder.stub import Caller, Stub
 from posed.daemon import encoding
-from posed.errors import InvalidArgumentError
+from posed.daemon.listeners import RETRY_S
 from posed.events import RateMode
 from posed.hal.profile import DeviceProfile
 from posed.proto import binder_pb2, pose_pb2
 from posed.sensors import SensorService
+
+
+@dataclass(slots=True)
+class _PoseListener:
+    """A callback object, the filter that it gets its poses from, and the sampling period it was last told of, us."""
+
+    proxy: Proxy
+    filter_name: str
+    told_us: int | None = None
 
 
 class PoseServiceStub(Stub):
@@ -25,22 +35,31 @@ class PoseServiceStub(Stub):
             camera_fov_deg=profile.camera_fov_deg,
             screen_rotation_deg=profile.screen_rotation_deg,
         )
-        self._listeners: dict[tuple[Peer, str], tuple[Proxy, str]] = {}
-        """Callback objects, and the filter that each gets its poses from."""
-        self._watched: set[Peer] = set()
+        self._listeners: dict[tuple[Peer, str], _PoseListener] = {}
+        self.retry_s: float | None = None
+        """When to `tell` again: seconds from now; None if everybody knows."""
+
+    def tell(self) -> None:
+        """Tell the listeners who do not know it yet how fast the sensors run now."""
+        self.retry_s = None
+        sampling_us = self._service.pose_sampling_period_us
+        for listener in self._listeners.values():
+            if listener.told_us != sampling_us:
+                if listener.proxy.onPoseConfiguration(self._configuration(listener.filter_name)):
+                    listener.told_us = sampling_us
+                else:
+                    self.retry_s = RETRY_S
 
     def registerPose(self, request: pose_pb2.PoseRequest, caller: Caller) -> pose_pb2.PoseRegistration:
-        if not request.listener:
-            raise InvalidArgumentError("the request names no listener; give the name of its callback object")
         key = (caller.peer, request.listener)
-        before_us = self._service.pose_sampling_period_us
         filter_name = request.filter or self._service.filter_names[0]
+        listener = _PoseListener(caller.peer.proxy(_LISTENER, request.listener), filter_name)
         self._service.register_pose(key, request.pose_period_us, request.sampling_period_us, filter_name)
-        self._tell_if_changed(before_us, besides=key)
-        if caller.peer not in self._watched:
-            self._watched.add(caller.peer)
-            caller.peer.link_to_death(lambda: self._peer_died(caller.peer))
-        self._listeners[key] = caller.peer.proxy(_LISTENER, request.listener), filter_name
+        caller.peer.link_to_death(self._peer_died)
+        # The reply tells this one.
+        listener.told_us = self._service.pose_sampling_period_us
+        self._listeners[key] = listener
+        self.tell()
         return pose_pb2.PoseRegistration(
             pose_topic=encoding.pose_topic(request.pose_period_us, filter_name),
             truth_topic=encoding.truth_topic(request.pose_period_us, filter_name),
@@ -53,22 +72,13 @@ class PoseServiceStub(Stub):
         return binder_pb2.Empty()
 
     def _forget(self, key: tuple[Peer, str]) -> None:
-        before_us = self._service.pose_sampling_period_us
         self._service.unregister_pose(key)
-        if self._listeners.pop(key, None) is not None:
-            self._tell_if_changed(before_us, besides=key)
+        self._listeners.pop(key, None)
+        self.tell()
 
     def _peer_died(self, peer: Peer) -> None:
-        self._watched.discard(peer)
         for key in [key for key in self._listeners if key[0] is peer]:
             self._forget(key)
-
-    def _tell_if_changed(self, before_us: int | None, besides: tuple[Peer, str]) -> None:
-        if self._service.pose_sampling_period_us in (before_us, None):
-            return
-        for key, (proxy, filter_name) in self._listeners.items():
-            if key != besides:
-                proxy.onPoseConfiguration(self._configuration(filter_name))
 
     def _configuration(self, filter_name: str) -> pose_pb2.PoseConfiguration:
         sampling_us = self._service.pose_sampling_period_us or 0

@@ -38,7 +38,11 @@ class PosePublisher:
         self._encoder = encoding.PoseEncoder(boot_id)
         self._topics: set[bytes] = set()
         self.socket = xpub(context)
-        bind_socket(self.socket, path)
+        try:
+            bind_socket(self.socket, path)
+        except BaseException:
+            self.socket.close()
+            raise
 
     def read_subscriptions(self) -> None:
         """Take in who subscribed to what since the last call."""
