@@ -373,3 +373,26 @@ def test_the_end_of_a_recording_lets_go_what_waits_for_its_latency(make_bench: M
     bench.advance_ms(1000)
     assert _taken_ms(listener, GYRO) == [20, 40, 60, 80, 100]
     assert bench.service.next_deadline_ns() is None
+
+
+def test_what_the_source_refuses_leaves_nothing_behind(make_bench: MakeBench) -> None:
+    bench = make_bench((SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD, SensorType.GYROSCOPE))
+    batch = bench.source.batch
+
+    def refuse(handle: int, period_ns: int, latency_ns: int) -> int:
+        if handle == MAG:
+            raise InvalidArgumentError("no magnetometer today")
+        return int(batch(handle, period_ns, latency_ns))
+
+    bench.source.batch = refuse
+    with pytest.raises(InvalidArgumentError, match="today"):
+        bench.service.register_pose("a", 100_000, 20_000)
+    with pytest.raises(InvalidArgumentError, match="today"):
+        bench.service.enable(bench.service.connect(), MAG, 20_000, 0)
+    assert list(bench.service.active_sensors) == []
+    assert bench.service.pose_sampling_period_us is None
+    assert list(bench.service.registrations.newest_first()) == []
+    bench.source.batch = batch
+    bench.service.register_pose("a", 100_000, 20_000)
+    bench.advance_ms(300)
+    assert len(bench.service.take_poses()) > 1

@@ -169,3 +169,37 @@ def test_a_sensor_that_the_source_refuses_leaves_no_trace(
     bench.service.enable(listener, GYRO, 20_000, 0)
     bench.advance_ms(100)
     assert _taken_ms(listener, GYRO) == [20, 40, 60, 80, 100]
+
+
+def test_a_flush_of_a_dynamic_sensor_that_went_is_forgotten_with_it(make_bench: MakeBench) -> None:
+    bench = make_bench((GYRO,))
+    listener = bench.service.connect()
+    bench.service.enable(listener, GYRO, 20_000, 0)
+    bench.source.connected = (_dynamic(1000),)
+    bench.advance_ms(20)
+    bench.service.enable(listener, 1000, 20_000, 0)
+    bench.source.flush_is_slow = True
+    bench.service.flush(listener)
+    bench.source.disconnected = (1000,)
+    bench.advance_ms(40)
+    bench.source.lose()
+    bench.advance_ms(60)
+    flushed: list[int] = []
+    while listener:
+        flushed += listener.take(1000).flush_completes
+    assert flushed == [GYRO]
+
+
+def test_what_a_returned_source_makes_of_a_period_is_taken_over(make_bench: MakeBench) -> None:
+    bench = make_bench((GYRO, ACC))
+    bench.service.enable(bench.service.connect(), GYRO, 20_000, 0)
+    bench.source.lose()
+    bench.advance_ms(20)
+    bench.service.enable(bench.service.connect(), ACC, 60_000, 0)
+    configured = {sensor.info.handle: sensor for sensor in bench.service.active_sensors}
+    assert configured[ACC].configured_period_ns == 60_000_000
+    bench.source.is_lost = False
+    bench.source.batch = lambda handle, period_ns, latency_ns: period_ns // 2
+    bench.advance_ms(1000)
+    assert configured[ACC].configured_period_ns == 30_000_000
+    assert configured[GYRO].configured_period_ns == 10_000_000

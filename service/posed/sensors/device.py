@@ -33,6 +33,8 @@ class SensorDevice:
         """CPU time spent in the source."""
         self._lost = False
         self._dynamic: set[int] = set()
+        self.reconfigured: dict[int, int] = {}
+        """Periods (ns) by handle that a source chose when it returned, for the owner to take over and clear."""
 
     @property
     def time_map(self) -> TimeMap:
@@ -126,6 +128,7 @@ class SensorDevice:
     def _drop_dynamic(self, handle: int) -> None:
         self._dynamic.discard(handle)
         self._active.pop(handle, None)
+        self._flushing = [asked for asked in self._flushing if asked != handle]
 
     def _start(self, handle: int, params: BatchParams, was_active: bool = False) -> int:
         period_ns = self._source.batch(handle, params.sampling_period_ns, params.max_report_latency_ns or 0)
@@ -136,7 +139,9 @@ class SensorDevice:
     def _reconnect(self) -> None:
         self.retry_ns = None
         for handle, params in self._active.items():
-            self._call(lambda handle=handle, params=params: self._start(handle, params))  # type: ignore[misc]
+            period_ns = self._call(lambda handle=handle, params=params: self._start(handle, params))  # type: ignore[misc]
+            if period_ns is not None:
+                self.reconfigured[handle] = period_ns
         if self.retry_ns is None:
             self._lost = False
             _log.warning("the source is back; %d sensors run again", len(self._active))

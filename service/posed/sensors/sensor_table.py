@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Iterable
 
 from posed.clock import Clock
-from posed.errors import InvalidArgumentError
+from posed.errors import InvalidArgumentError, PosedError
 from posed.events import EventBatch, EventColumn, SensorInfo, SensorType
 from posed.fusion.filter import SensorErrors
 from posed.sensors.active_sensor import ActiveSensor
@@ -96,6 +96,13 @@ class SensorTable:
         self._by_handle.update({info.handle: ActiveSensor(info) for info in batch.connected})
         self.dynamic_changes += len(batch.connected)
 
+    def take_over_periods(self) -> None:
+        """Note what a source that has returned made of the periods it was asked for."""
+        for handle, period_ns in self._device.reconfigured.items():
+            sensor = self._by_handle[handle]
+            sensor.follow(sensor.params, period_ns)
+        self._device.reconfigured.clear()
+
     def disconnect(self, handle: int) -> ActiveSensor:
         """Remove a dynamic sensor that went, and return what it was."""
         gone = self._by_handle.pop(handle)
@@ -116,8 +123,16 @@ class SensorTable:
 
     def _request(self, sensor: ActiveSensor, key: Hashable, params: BatchParams) -> None:
         if sensor.requests.get(key) != params:
+            before = sensor.requests.get(key)
             sensor.requests[key] = params
-            self._configure(sensor)
+            try:
+                self._configure(sensor)
+            except PosedError:
+                if before is None:
+                    del sensor.requests[key]
+                else:
+                    sensor.requests[key] = before
+                raise
 
     def _withdraw(self, sensor: ActiveSensor, key: Hashable) -> None:
         if sensor.requests.pop(key, None) is not None:

@@ -129,6 +129,7 @@ class SensorService:
         if handle in connection.registrations:
             self.advance()
             self._leave(self._table[handle], connection)
+            self._note_end(connection, handle)
 
     def disconnect(self, connection: SensorEventConnection) -> None:
         """Undo every `enable` of a connection."""
@@ -183,7 +184,7 @@ class SensorService:
         """Ask for poses every `pose_period_us` from sensors at `sampling_period_us` (0 = fastest), or change that.
 
         filter_name: one of `filter_names`; None is the first. Raises InvalidArgumentError if the source cannot carry a
-        pose, a period is out of range or no such filter runs.
+        pose, a period is out of range or no such filter runs, and what the source raises, of which no request remains.
         """
         names = self.filter_names
         if filter_name is not None and filter_name not in names:
@@ -200,7 +201,11 @@ class SensorService:
         for fusion in self._fusions:
             if fusion is not chosen:
                 fusion.withdraw(key, self._sample_now_ns())
-        self._follow_pose_requests()
+        try:
+            self._follow_pose_requests()
+        except PosedError:
+            self.unregister_pose(key)
+            raise
 
     def unregister_pose(self, key: Hashable) -> None:
         """Undo `register_pose`; an unknown key is left alone."""
@@ -340,6 +345,8 @@ class SensorService:
         batch = self._device.drain(now_ns)
         if batch.connected:
             self._table.connect(batch)
+        if self._device.reconfigured:
+            self._table.take_over_periods()
         # A recording that has ended moves no pose on: its last sample is the last thing known.
         end_ns = self._device.end_ns
         until_ns = now_ns if end_ns is None else min(now_ns, end_ns)
@@ -363,6 +370,7 @@ class SensorService:
         for handle in batch.disconnected:
             for connection in self._table.disconnect(handle).listeners:
                 self._forget(connection, handle)
+                self._note_end(connection, handle)
 
     def _sample_now_ns(self) -> int:
         return self._device.time_map.to_sample(self._clock.now_ns())
@@ -401,6 +409,8 @@ class SensorService:
         connection.remove(handle)
         if not connection.registrations:
             self._connections.pop(connection, None)
+
+    def _note_end(self, connection: SensorEventConnection, handle: int) -> None:
         self.registrations.add(RegistrationRecord(self._clock.now_ns(), False, handle, connection.client))
 
     def _release_due(self) -> None:
@@ -424,6 +434,7 @@ class SensorService:
         if sensor.release() and sensor.is_one_shot:
             for connection in list(sensor.listeners):
                 self._leave(sensor, connection)
+                self._note_end(connection, sensor.info.handle)
 
 
 _POSE = "pose"
