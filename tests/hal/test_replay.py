@@ -356,6 +356,17 @@ def test_in_the_gap_of_a_loop_the_next_sample_is_of_the_next_pass() -> None:
     assert source.next_sample_ns(GYRO) == FIRST + LAST - FIRST + LOOP_GAP_NS
 
 
+def test_a_sensor_that_begins_passes_ahead_of_a_drain_has_nothing_in_it() -> None:
+    source, clock = a_source(loop=True, on=(GYRO,))
+    pass_ns = LAST - FIRST + LOOP_GAP_NS
+    source.drain(FIRST + 10 * MS)
+    clock.advance_to(source.time_map.to_boot(FIRST + 2 * pass_ns + 10 * MS))
+    source.activate(MAG, True)
+    assert list(source.drain(FIRST + pass_ns + 10 * MS).columns) == [GYRO]
+    begun = source.drain(FIRST + 2 * pass_ns + 500 * MS).columns[MAG]
+    assert begun.timestamp_ns[0] > FIRST + 2 * pass_ns + 10 * MS
+
+
 operations = st.lists(
     st.tuples(
         st.sampled_from(["on", "off", "rate", "wait"]),

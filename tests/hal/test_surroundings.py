@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -134,3 +135,34 @@ def test_a_phone_without_them_lists_none_and_a_bad_one_is_named(tmp_path: Path) 
     (tmp_path / "mine.toml").write_text(shipped.replace("rates_hz = [1, 10, 25]", "rates_hz = [2000]"))
     with pytest.raises(ProfileError, match=r"pressure\.rates_hz"):
         load_profile(str(tmp_path / "mine.toml"))
+
+
+def test_changes_are_the_same_however_seldom_they_are_drained() -> None:
+    batches = []
+    for drains in ((15, 25, 28, 40, 60), (60,)):
+        source, clock = a_phone(LIGHT, period_ms=10)
+        events: list[tuple[float, float]] = []
+        for at_ms, value in ((20, 10.0), (23, 15.0), (26, 20.0), (50, 30.0)):
+            events += [each for t in drains if t <= at_ms for each in told(drained(source, clock, t), LIGHT)]
+            drains = tuple(t for t in drains if t > at_ms)
+            clock.advance_to(START + at_ms * MS)
+            source.set_environment(LIGHT, value)
+        assert source.next_sample_ns(int(LIGHT)) is not None
+        for t in drains:
+            events += told(drained(source, clock, t), LIGHT)
+        batches.append(events)
+    assert batches[0] == [(0, 300), (20, 10), (30, 20), (50, 30)]
+    assert batches[1] == batches[0]
+
+
+def test_what_is_set_while_nothing_runs_is_kept_once() -> None:
+    source, clock = a_phone()
+    for k in range(1000):
+        clock.advance_to(START + k * MS)
+        source.set_environment(PRESSURE, 900.0 + k % 7)
+    surroundings: Any = source._surroundings  # type: ignore[attr-defined]
+    assert len(surroundings._values[int(PRESSURE)]._since) == 1
+    source.batch(int(PRESSURE), 0, 0)
+    source.activate(int(PRESSURE), True)
+    (_, first), *_ = told(drained(source, clock, 1200), PRESSURE)
+    assert first == pytest.approx(900.0 + 999 % 7, abs=0.5)

@@ -227,7 +227,8 @@ class ReplaySource:
             stream.rows(max(after_ns, shift_ns + self._recording.start_ns - 1), until_ns, shift_ns)
             for shift_ns in range(self._shift_ns(after_ns), self._shift_ns(until_ns) + 1, self._pass_ns)
         ]
-        return EventColumn.concatenate(passes)
+        # A sensor that begins beyond `until_ns`, in the next pass, has none.
+        return EventColumn.concatenate(passes) if passes else stream.rows(after_ns, until_ns, self._shift_ns(after_ns))
 
 
 class _Stream:

@@ -1,6 +1,8 @@
 """What surrounds a simulated phone, as its pressure, light and proximity sensors tell it: values that somebody sets."""
 
 import math
+from bisect import bisect_right
+from operator import itemgetter
 
 from posed.errors import InvalidArgumentError
 from posed.events import EventColumn, ReportingMode, SensorInfo, SensorType
@@ -58,7 +60,10 @@ class Surroundings:
             )
         self._values[int(kind)].set(value, at_ns)
         active = self._active.get(int(kind))
-        if isinstance(active, _Changes):
+        if active is None:
+            # Whoever switches it on reads from then on; without a drain nothing else would forget.
+            self._values[int(kind)].forget_before(at_ns)
+        elif isinstance(active, _Changes):
             active.change(value, at_ns)
 
     def activate(self, handle: int, enabled: bool, at_ns: int) -> None:
@@ -165,23 +170,36 @@ class _Changes:
 
     def __init__(self, value: float, at_ns: int, period_ns: int) -> None:
         self.period_ns = period_ns
-        self._told: float | None = None
+        self._told: list[tuple[int, float]] = []
+        """What is to be taken."""
+        self._last_told: float | None = None
         self._value = value
         self._earliest_ns = at_ns
-        self.next_ns: int | None = at_ns
+        self._due_ns: int | None = at_ns
+
+    @property
+    def next_ns(self) -> int | None:
+        return self._told[0][0] if self._told else self._due_ns
 
     def change(self, value: float, at_ns: int) -> None:
         """Have a new value; of several within a period the last is told."""
+        self._tell(at_ns - 1)
         self._value = value
-        if self.next_ns is None:
-            self.next_ns = max(at_ns, self._earliest_ns)
+        if self._due_ns is None:
+            self._due_ns = max(at_ns, self._earliest_ns)
 
     def take(self, until_ns: int) -> EventColumn | None:
-        if self.next_ns is None or self.next_ns > until_ns:
-            return None
-        at_ns, self.next_ns = self.next_ns, None
-        if self._value == self._told:
-            return None
-        self._told = self._value
-        self._earliest_ns = at_ns + self.period_ns
-        return EventColumn.of_rows([at_ns], [[self._value]])
+        self._tell(until_ns)
+        count = bisect_right(self._told, until_ns, key=itemgetter(0))
+        taken, self._told = self._told[:count], self._told[count:]
+        return EventColumn.of_rows([at_ns for at_ns, _ in taken], [[value] for _, value in taken]) if taken else None
+
+    def _tell(self, until_ns: int) -> None:
+        """Have the value told if it is due by `until_ns` and another than before."""
+        if self._due_ns is None or self._due_ns > until_ns:
+            return
+        at_ns, self._due_ns = self._due_ns, None
+        if self._value != self._last_told:
+            self._last_told = self._value
+            self._earliest_ns = at_ns + self.period_ns
+            self._told.append((at_ns, self._value))
