@@ -2,7 +2,7 @@
 
 from posed.sensors.client import Client
 from posed.sensors.connection import EventChunk, SensorEventConnection
-from posed.sensors.pose_fusion import device_errors, make_device_filter
+from posed.sensors.device_filter import device_errors, make_device_filter
 from posed.sensors.service import SensorService
 
 __all__ = ["Client", "EventChunk", "SensorEventConnection", "SensorService", "device_errors", "make_device_filter"]

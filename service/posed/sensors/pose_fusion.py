@@ -8,9 +8,7 @@ from operator import itemgetter
 from posed.clock import Clock
 from posed.errors import InvalidArgumentError
 from posed.events import EventColumn, FilterStatus, FlatEvent, Pose, Position, RateMode, SensorType
-from posed.fusion import make_filter
-from posed.fusion.filter import OrientationFilter, SensorErrors
-from posed.hal.profile import DeviceProfile
+from posed.fusion.filter import OrientationFilter
 from posed.sensors.alignment import aligned
 from posed.sensors.fused_events import FusedEvents, PoseMotion
 from posed.sensors.pose_grid import PoseGrid
@@ -18,20 +16,7 @@ from posed.sensors.pose_grid import PoseGrid
 MIN_POSE_PERIOD_US = 5_000
 MAX_POSE_PERIOD_US = 1_000_000
 
-_PARTS = (SensorType.GYROSCOPE, SensorType.ACCELEROMETER, SensorType.MAGNETIC_FIELD)
 _OCCURRENCES = int(FilterStatus.GAP | FilterStatus.BAD_SAMPLE)
-
-
-def device_errors(profile: DeviceProfile) -> SensorErrors:
-    """Return the noise and the delays of a device's parts as filters take them."""
-    noise = profile.noise
-    gyro, acc, mag = (profile.sensors[kind].delay_s for kind in _PARTS)
-    return SensorErrors(noise.gyroscope_density, noise.accelerometer_std, noise.magnetic_field_std, gyro, acc, mag)
-
-
-def make_device_filter(name: str, profile: DeviceProfile) -> OrientationFilter:
-    """Make a filter by name for the errors of a device's parts; raises InvalidArgumentError for an unknown name."""
-    return make_filter(name, device_errors(profile))
 
 
 @dataclass(frozen=True, slots=True)
