@@ -203,3 +203,17 @@ def test_what_a_returned_source_makes_of_a_period_is_taken_over(make_bench: Make
     bench.advance_ms(1000)
     assert configured[ACC].configured_period_ns == 30_000_000
     assert configured[GYRO].configured_period_ns == 10_000_000
+
+
+def test_events_of_a_dynamic_sensor_that_went_are_nobodys(make_bench: MakeBench) -> None:
+    bench = make_bench((GYRO,))
+    listener = bench.service.connect()
+    bench.service.enable(listener, GYRO, 20_000, 0)
+    bench.source.connected = (_dynamic(1000),)
+    bench.advance_ms(20)
+    bench.service.enable(listener, 1000, 20_000, 0)
+    bench.source.disconnected = (1000,)
+    bench.advance_ms(40)
+    assert 1000 in bench.source._done_ns
+    bench.advance_ms(80)
+    assert _taken_ms(listener, GYRO)[-1] == 80

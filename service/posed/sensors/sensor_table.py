@@ -111,10 +111,12 @@ class SensorTable:
         return gone
 
     def take_in(self, columns: Iterable[tuple[int, EventColumn]]) -> None:
-        """Hold events, by handle, for those who listen."""
+        """Hold events, by handle, for those who listen; those of a sensor that has gone are nobody's."""
         boot_ns = self._clock.now_ns()
         for handle, column in columns:
-            self._by_handle[handle].take_in(column, boot_ns)
+            sensor = self._by_handle.get(handle)
+            if sensor is not None:
+                sensor.take_in(column, boot_ns)
 
     # Private
 
