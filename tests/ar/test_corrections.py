@@ -1,7 +1,9 @@
 """Corrections by name."""
 
+import itertools
 import json
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -37,7 +39,17 @@ def test_what_is_saved_is_there_the_next_time(store: CorrectionStore, tmp_path: 
     again.delete("roof")
     again.delete("nobody")
     assert list(store.load()) == ["Πύργος מגדל"]
-    assert [path.name for path in (tmp_path / "deep").iterdir()] == ["corrections.json"]
+    assert {path.name for path in (tmp_path / "deep").iterdir()} == {"corrections.json", "corrections.json.lock"}
+
+
+def test_of_changes_at_the_same_time_none_is_lost(store: CorrectionStore, tmp_path: Path) -> None:
+    names = [str(number) for number in range(60)]
+    stores = itertools.cycle((store, CorrectionStore(tmp_path / "deep" / "corrections.json")))
+    with ThreadPoolExecutor(8) as threads:
+        list(threads.map(lambda of, name: of.save(name, _ROOF), stores, names))
+        assert set(store.load()) == set(names)
+        list(threads.map(lambda of, name: of.delete(name), stores, names[1:]))
+    assert set(store.load()) == {"0"}
 
 
 @pytest.mark.parametrize("name", ["", "x" * 61, "two\nlines", "\x00"])

@@ -1,8 +1,11 @@
 """Pose corrections by name, kept for the next time."""
 
+import contextlib
+import fcntl
 import json
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -34,20 +37,30 @@ class CorrectionStore:
         """Keep a correction; raises InvalidArgumentError for a bad name or value, or too many of them."""
         if not 0 < len(name) <= _MAX_NAME or not name.isprintable():
             raise InvalidArgumentError(f"a correction's name has 1 to {_MAX_NAME} printable characters, not {name!r}")
-        corrections = self.load()
-        corrections[name] = correction(value)
-        if len(corrections) > _MAX_COUNT:
-            raise InvalidArgumentError(f"{_MAX_COUNT} corrections are kept; delete one first")
-        self._write(corrections)
+        with self._locked():
+            corrections = self.load()
+            corrections[name] = correction(value)
+            if len(corrections) > _MAX_COUNT:
+                raise InvalidArgumentError(f"{_MAX_COUNT} corrections are kept; delete one first")
+            self._write(corrections)
 
     def delete(self, name: str) -> None:
         """Forget a correction; an unknown name is left alone."""
-        corrections = self.load()
-        if corrections.pop(name, None) is not None:
-            self._write(corrections)
+        with self._locked():
+            corrections = self.load()
+            if corrections.pop(name, None) is not None:
+                self._write(corrections)
+
+    @contextlib.contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Keep other threads and other processes from changing the file meanwhile."""
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        # Beside it, not the file itself: that is another one with each change.
+        with Path(f"{self._path}.lock").open("a") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            yield
 
     def _write(self, corrections: dict[str, dict[str, Any]]) -> None:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
         # Written beside it and moved into place: whoever reads meanwhile gets the one or the other, whole.
         descriptor, written = tempfile.mkstemp(dir=self._path.parent)
         with os.fdopen(descriptor, "w") as file:
