@@ -347,6 +347,42 @@ def test_the_field_book_is_geojson_with_its_places_and_no_invented_height(page: 
     assert free["properties"]["distance_m"] is None
 
 
+def test_two_tabs_share_one_field_book(page: Page) -> None:
+    found = page.evaluate(
+        """async ([one, other]) => {
+            const { Book } = await import("/page/book.js");
+            const [a, b] = [0, 1].map(() => new Book(() => "deg", () => {}));
+            const kept = () => JSON.parse(localStorage.getItem("posed-ar-book")).map(({ name }) => name);
+            a.record(one);
+            b.record(other);
+            const both = kept();
+            a.show();
+            document.querySelector("#book-records button").click();
+            const left = kept();
+            localStorage.clear();
+            return [both, left];
+        }""",
+        _SIGHTS,
+    )
+    assert found == [['Tower "A", מגדל', ""], [""]]
+
+
+def test_a_field_book_that_the_browser_does_not_keep_stays_in_its_tab(page: Page) -> None:
+    count = page.evaluate(
+        """async (sights) => {
+            const { Book } = await import("/page/book.js");
+            const book = new Book(() => "deg", () => {});
+            const { setItem } = Storage.prototype;
+            Storage.prototype.setItem = () => { throw new DOMException("", "QuotaExceededError"); };
+            for (const sight of sights) book.record(sight);
+            Storage.prototype.setItem = setItem;
+            return book.sights.length;
+        }""",
+        _SIGHTS,
+    )
+    assert count == len(_SIGHTS)
+
+
 def test_names_run_in_the_direction_of_their_script(page: Page) -> None:
     found = page.evaluate(
         """async (names) => {

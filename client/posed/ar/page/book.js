@@ -54,11 +54,13 @@ export class Book {
     }
     /** @type {Sight[]} */
     this.sights = this._load();
+    this._isKept = true;
     this.show();
   }
 
   /** Add a sight; returns it in words. */
   record(sight) {
+    this._takeKept();
     this.sights.push(sight);
     if (this.sights.length > MOST) this.sights.shift();
     this._keep();
@@ -78,7 +80,10 @@ export class Book {
   _item(sight) {
     const name = sight.name || "Free sight";
     const remove = () => {
-      this.sights.splice(this.sights.indexOf(sight), 1);
+      this._takeKept();
+      const written = JSON.stringify(sight);
+      const at = this.sights.findIndex((other) => JSON.stringify(other) === written);
+      if (at !== -1) this.sights.splice(at, 1);
       this._keep();
       this.show();
       document.querySelector("#book-title").focus();
@@ -105,6 +110,11 @@ export class Book {
     return parts.join(" · ");
   }
 
+  /** Another tab may have changed the book since; one that the browser does not keep is in this tab alone. */
+  _takeKept() {
+    if (this._isKept) this.sights = this._load();
+  }
+
   _load() {
     try {
       const kept = JSON.parse(localStorage.getItem(KEPT_AS) ?? "[]");
@@ -118,7 +128,9 @@ export class Book {
   _keep() {
     try {
       localStorage.setItem(KEPT_AS, JSON.stringify(this.sights));
+      this._isKept = true;
     } catch (error) {
+      this._isKept = false;
       this._tell(`This browser does not keep the field book (${error.name}): download it before you leave the page.`);
     }
   }
