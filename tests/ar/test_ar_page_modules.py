@@ -135,6 +135,50 @@ def test_angles_are_read_as_people_write_them(page: Page, text: str, unit: str, 
     assert read == (None if degrees is None else pytest.approx(degrees, abs=1e-9))
 
 
+def _raw(kind: str, coordinates: Any) -> dict[str, Any]:
+    return {"id": "1", "name": "", "kind": kind, "note": "", "color": None, "coordinates": coordinates, "ground": None}
+
+
+@pytest.mark.parametrize(
+    ("kind", "coordinates"),
+    [
+        ("point", [[22.001, 40, None]]),
+        ("line", [[22.001, 40, None], [22.001, 40, None]]),
+        ("polygon", [[[22.001, 40, None], [22.001, 40.001, 5], [22.001, 39.999, 5], [22.001, 40, None]]]),
+    ],
+)
+def test_what_has_no_height_stays_level_with_an_eye_that_climbs(page: Page, kind: str, coordinates: Any) -> None:
+    above = page.evaluate(
+        """async (raw) => {
+            const { Places } = await import("/page/places.js");
+            const places = new Places();
+            places.load({ viewpoint: null, places: [raw] });
+            return [0, 60, 60.05].map((height) => {
+                const eye = places.moveTo({ latitude: 40, longitude: 22, height });
+                return places.all[0].anchor[2] - eye[2];
+            });
+        }""",
+        _raw(kind, coordinates),
+    )
+    assert above == pytest.approx([0, 0, 0], abs=0.1)
+
+
+def test_places_with_heights_shift_as_a_whole_until_the_eye_is_far(page: Page) -> None:
+    origins = page.evaluate(
+        """async (raw) => {
+            const { Places } = await import("/page/places.js");
+            const places = new Places();
+            places.load({ viewpoint: null, places: [raw] });
+            return [0, 150, 250].map((height) => {
+                places.moveTo({ latitude: 40, longitude: 22, height });
+                return places.origin.height;
+            });
+        }""",
+        _raw("point", [[22.001, 40, 5]]),
+    )
+    assert origins == [0, 0, 250]
+
+
 _FREE = {"left": 70, "top": 140, "right": 1272, "bottom": 600}
 _CROSS = {"x": 610, "y": 330, "width": 60, "height": 60}
 

@@ -71,7 +71,9 @@ export class CorrectionPanel {
   /** Turn the overlay with the dot. */
   dragged(x, y) {
     const { bearing } = this._seenAt(x, y);
-    const headingOffset = wrap(sightOf(this._dragged, this._frame.eye).bearing - bearing);
+    // The places may have been worked out anew.
+    const place = this._scene.places.byId(this._dragged.id) ?? this._dragged;
+    const headingOffset = wrap(sightOf(place, this._frame.eye).bearing - bearing);
     this._scene.correction = { ...this._scene.correction, name: "", headingOffset };
     this._ways.changed();
   }

@@ -4,6 +4,8 @@ import { enu, refract } from "./geodesy.js";
 
 // Moving by less, places shift as a whole; by more, they are worked out anew. 200 m turn the vertical by 0.002 degrees.
 const WORK_OUT_ANEW_M = 200;
+// What has no height is level with the eye: so much higher or lower, and it no longer looks it.
+const LEVEL_WITHIN_M = 0.1;
 const GROUND_NEARBY_M = 3000;
 const EYE_M = 1.7;
 
@@ -30,12 +32,15 @@ export class Places {
     this.ground = -EYE_M;
     this.origin = null;
     this._raw = [];
+    /** Whether some place has no height. */
+    this._hasLevel = false;
   }
 
   /** Take what /places.json holds. */
   load(json) {
     this.viewpoint = json.viewpoint;
     this._raw = json.places;
+    this._hasLevel = json.places.some(lacksHeight);
     this.origin = null;
   }
 
@@ -51,7 +56,8 @@ export class Places {
   moveTo(observer) {
     if (this.origin !== null) {
       const shift = this.fromOrigin(observer);
-      if (Math.hypot(shift[0], shift[1], shift[2]) < WORK_OUT_ANEW_M) return shift;
+      const isLevel = !this._hasLevel || Math.abs(shift[2]) <= LEVEL_WITHIN_M;
+      if (isLevel && Math.hypot(shift[0], shift[1], shift[2]) < WORK_OUT_ANEW_M) return shift;
     }
     this._workOut(observer);
     return [0, 0, 0];
@@ -95,6 +101,11 @@ function workedOut(raw, seen) {
     distance: Math.hypot(anchor[0], anchor[1], anchor[2]),
     position: { latitude, longitude, height },
   };
+}
+
+function lacksHeight({ kind, coordinates }) {
+  const positions = kind === "polygon" ? coordinates.flat() : coordinates;
+  return positions.some(([, , height]) => height === null);
 }
 
 function ringsOf(raw) {
