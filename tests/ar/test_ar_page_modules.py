@@ -179,6 +179,40 @@ def test_places_with_heights_shift_as_a_whole_until_the_eye_is_far(page: Page) -
     assert origins == [0, 0, 250]
 
 
+_FRAME = """
+    const { Frame } = await import("/page/frame.js");
+    const { Scene } = await import("/page/scene.js");
+    const { Target } = await import("/page/target.js");
+    const scene = new Scene();
+    const target = new Target();
+    const frame = new Frame(scene, target, () => {});
+    scene.places.load({ viewpoint: null, places: [raw] });
+    scene.takeLink({ state: "CONNECTED", reason: "", n: 1 });
+    scene.takeObserver({ latitude: 40, longitude: 22, height: 5, source: "gnss", wmm_declination_deg: null });
+    // Upright, the camera level and to the north.
+    scene.takePose({ n: 1, t: 0, b: 0, q: [Math.SQRT1_2, 0, 0, Math.SQRT1_2], w: [0, 0, 0], a: 1, s: 0 }, 0);
+    frame.resize();
+"""
+
+
+def test_places_go_with_the_position_they_were_seen_from(page: Page) -> None:
+    found = page.evaluate(
+        f"""async (raw) => {{
+            {_FRAME}
+            const draw = () => {{
+                frame.draw(NaN, true);
+                return [frame.overlay.drawn.length, target.place?.id];
+            }};
+            const before = draw();
+            target.hold(target.place);
+            scene.takeLink({{ state: "CONNECTED", reason: "", n: 2 }});
+            return [before, draw()];
+        }}""",
+        _raw("point", [[22, 40.001, 5]]),
+    )
+    assert found == [[1, "1"], [0, None]]
+
+
 _FREE = {"left": 70, "top": 140, "right": 1272, "bottom": 600}
 _CROSS = {"x": 610, "y": 330, "width": 60, "height": 60}
 

@@ -67,6 +67,7 @@ const live = new Live("/live", {
     s: (link) => {
       scene.takeLink(link);
       read();
+      redraw();
     },
     p: (pose) => {
       scene.takePose(pose, performance.now());

@@ -82,7 +82,7 @@ export class Frame {
     const isAhead = pose !== null && scene.chosen.extrapolate && !scene.isFrozen;
     const uncorrected = pose === null ? null : scene.poseOrientation(isAhead ? bootMs : NaN);
     const byPose = uncorrected === null ? null : scene.corrected(uncorrected);
-    this.eye = scene.position === null ? HERE : places.moveTo(scene.position);
+    this.eye = places.moveTo(scene.position);
     const isMoving = this._drawBackground(byPose, bootMs, isForced);
     if (byPose === null) return isMoving;
     if (isNewPose || isForced || isAhead) this._drawOverlay(byPose);

@@ -52,8 +52,17 @@ export class Places {
     return this.all.find((place) => place.id === id) ?? null;
   }
 
-  /** Return where the observer is, ENU m from the origin; works the places out anew if they have moved far from it. */
+  /**
+   * Return where the observer is, ENU m from the origin; works the places out anew if they have moved far from it.
+   *
+   * @param {?import("./geodesy.js").Position} observer  null: nobody knows, and so there are no places around
+   */
   moveTo(observer) {
+    if (observer === null) {
+      if (this.origin !== null) this.all = [];
+      this.origin = null;
+      return [0, 0, 0];
+    }
     if (this.origin !== null) {
       const shift = this.fromOrigin(observer);
       const isLevel = !this._hasLevel || Math.abs(shift[2]) <= LEVEL_WITHIN_M;
