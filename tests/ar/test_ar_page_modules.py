@@ -79,6 +79,28 @@ def test_of_one_frame_the_link_is_taken_before_what_came_over_it(page: Page) -> 
     assert taken[:2] == [["s", 2], ["o", 1]]
 
 
+def test_a_clock_that_stood_still_is_learned_anew_at_once(page: Page) -> None:
+    # As performance.now() does while the machine is suspended.
+    offsets = page.evaluate(
+        """async () => {
+            const { Live } = await import("/web/live.js");
+            const live = new Live("/live", { on: {} });
+            const ask = (sent, trip, offset) => {
+                live._takeClock({ c: sent, b: sent + trip / 2 + offset }, sent + trip);
+                return live.offsetMs;
+            };
+            const offsets = [ask(0, 1, 500)];
+            // Held up on the way: still the same clock.
+            for (let i = 1; i < 8; i++) offsets.push(ask(5000 * i, 3, 501.2));
+            offsets.push(ask(40_000, 4, 3_600_500), ask(45_000, 2, 3_600_500.5));
+            live._socket.onclose = null;
+            live._socket.close();
+            return offsets;
+        }"""
+    )
+    assert offsets == [*[500] * 8, 3_600_500, 3_600_500.5]
+
+
 @pytest.mark.parametrize(
     ("degrees", "unit", "digits", "text"),
     [

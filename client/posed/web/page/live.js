@@ -7,6 +7,8 @@ const CLOCK_EVERY_MS = 5000;
 const CLOCK_TRIES_AT_OPEN = 5;
 // Of so many round trips the shortest counts: what a reply was held up by is in its offset as well.
 const CLOCK_KEPT = 8;
+// Far more than the clocks drift apart while so many are kept.
+const CLOCK_SLACK_MS = 1;
 
 /**
  * @typedef {Object} Handlers
@@ -86,7 +88,10 @@ export class Live {
 
   _takeClock(reply, at) {
     const trip = at - reply.c;
-    this._trips.push({ trip, offset: reply.b - (reply.c + at) / 2 });
+    const offset = reply.b - (reply.c + at) / 2;
+    // Both cannot be true of one clock: the browser's stands still in suspend. What was before counts no more.
+    if (Math.abs(offset - this.offsetMs) > trip / 2 + this.offsetErrorMs + CLOCK_SLACK_MS) this._trips = [];
+    this._trips.push({ trip, offset });
     if (this._trips.length > CLOCK_KEPT) this._trips.shift();
     let best = this._trips[0];
     for (const other of this._trips) if (other.trip < best.trip) best = other;
