@@ -196,9 +196,20 @@ def test_a_file_that_is_not_there_and_a_system_that_is_none_are_refused(write: W
     path = write(_feature("Point", [1, 2]))
     with pytest.raises(InvalidArgumentError, match="'EPSG:0' is no coordinate reference system"):
         load_places(path, crs="EPSG:0")
+    with pytest.raises(InvalidArgumentError, match=r"'IAU_2015:30100' is no .*celestial body"):
+        load_places(path, crs="IAU_2015:30100")
     path = write(_feature("Point", [1e30, 2]))
     with pytest.raises(InvalidArgumentError, match=re.escape("lie outside EPSG:2100; check --crs")):
         load_places(path, crs="EPSG:2100")
+
+
+@pytest.mark.parametrize(
+    ("crs", "kind"), [("EPSG:5773", "Vertical CRS"), ("EPSG:3855", "Vertical CRS"), ("EPSG:4978", "Geocentric CRS")]
+)
+def test_a_system_without_horizontal_coordinates_is_refused(write: Write, crs: str, kind: str) -> None:
+    path = write(_feature("Point", [22.9, 40.6]))
+    with pytest.raises(InvalidArgumentError, match=f"'{crs}' is a {kind}; give the code of the horizontal system"):
+        load_places(path, crs=crs)
 
 
 _JSON = st.recursive(

@@ -167,15 +167,19 @@ def _to_wgs84(crs: str | None, content: dict[str, Any]) -> ToWgs84:
         return lambda x, y: (x, y)
     try:
         from pyproj import CRS, Transformer
-        from pyproj.exceptions import CRSError
+        from pyproj.exceptions import ProjError
     except ImportError as error:
         raise MissingExtraError("--crs needs pyproj; install it with: pip install 'posed[web]'") from error
     try:
         # Of a compound system the first part is the horizontal one: heights are as the user states them.
         named = CRS.from_user_input(crs)
         horizontal = named.sub_crs_list[0] if named.is_compound else named.to_2d()
+        if not (horizontal.is_geographic or horizontal.is_projected):
+            raise InvalidArgumentError(
+                f"--crs {crs!r} is a {horizontal.type_name}; give the code of the horizontal system, such as EPSG:2100"
+            )
         transformer = Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True)
-    except CRSError as error:
+    except ProjError as error:
         raise InvalidArgumentError(
             f"--crs {crs!r} is no coordinate reference system ({error}); give its code, such as EPSG:2100"
         ) from error

@@ -94,6 +94,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     places = load_places(arguments.places or SAMPLE, crs=arguments.crs, geoid_undulation_m=arguments.heights)
+    if arguments.places is None and (arguments.crs is not None or arguments.heights is not None):
+        raise InvalidArgumentError("--crs and --heights say how to read the file of --places; name that too")
     background = arguments.panorama or arguments.photo
     if background is not None:
         _require_picture(background)
