@@ -1,7 +1,10 @@
 """Corrections by name."""
 
+import errno
 import itertools
 import json
+import os
+import re
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -52,7 +55,7 @@ def test_of_changes_at_the_same_time_none_is_lost(store: CorrectionStore, tmp_pa
     assert set(store.load()) == {"0"}
 
 
-@pytest.mark.parametrize("name", ["", "x" * 61, "two\nlines", "\x00"])
+@pytest.mark.parametrize("name", ["", "x" * 61, "two\nlines", "\x00", "\ud800"])
 def test_a_name_that_cannot_be_shown_is_refused(store: CorrectionStore, name: str) -> None:
     with pytest.raises(InvalidArgumentError, match="1 to 60 printable characters"):
         store.save(name, _ROOF)
@@ -68,6 +71,7 @@ def test_a_name_that_cannot_be_shown_is_refused(store: CorrectionStore, name: st
         ({"heading_offset_deg": float("nan")}, "heading_offset_deg = nan"),
         ({"heading_offset_deg": 361}, "from -360 to 360"),
         ({"heading_offset_deg": 10**400}, "from -360 to 360"),
+        ({"heading_offset_deg": 0, "saved": "\ud800"}, "allowed: printable characters"),
         ({"heading_offset_deg": 0, "position": [1, 2, 3]}, "position is null or an object"),
         ({"heading_offset_deg": 0, "position": {"latitude": 91, "longitude": 0, "height": 0}}, "latitude = 91"),
         ({"heading_offset_deg": 0, "position": {"latitude": 0, "longitude": 0}}, "height = None"),
@@ -98,6 +102,34 @@ def test_a_file_of_somebody_elses_is_neither_used_nor_overwritten(tmp_path: Path
         with pytest.raises(PosedError, match=r"holds no corrections.*move it away to begin anew"):
             attempt()
     assert path.read_bytes() == content.encode("latin-1")
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        ({"roof": {"heading_offset_deg": "7"}}, "heading_offset_deg = '7'"),
+        ({"\ud800": _ROOF}, "1 to 60 printable characters"),
+    ],
+)
+def test_a_file_that_holds_a_bad_correction_is_named(tmp_path: Path, kept: Any, said: str) -> None:
+    path = tmp_path / "corrections.json"
+    path.write_text(json.dumps({"corrections": kept}))
+    with pytest.raises(PosedError, match=re.escape(f"{path} holds no corrections: ") + f".*{said}.*; move it away"):
+        CorrectionStore(path).load()
+
+
+def test_what_cannot_be_kept_is_said_and_leaves_nothing_behind(store: CorrectionStore, tmp_path: Path) -> None:
+    store.save("roof", _ROOF)
+
+    def refuse(*paths: Any) -> None:
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "replace", refuse)
+        with pytest.raises(PosedError, match=r"cannot keep corrections in .*corrections.json: Permission denied; name"):
+            store.save("mine", _ROOF)
+    assert {path.name for path in (tmp_path / "deep").iterdir()} == {"corrections.json", "corrections.json.lock"}
+    assert set(store.load()) == {"roof"}
 
 
 def test_they_are_kept_with_the_users_data(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -27,19 +27,20 @@ class CorrectionStore:
             found = json.loads(self._path.read_text())["corrections"]
             if not isinstance(found, dict):
                 raise TypeError("corrections is no object")
+            return {_checked_name(name): correction(value) for name, value in found.items()}
         except FileNotFoundError:
             return {}
-        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RecursionError, InvalidArgumentError) as error:
             raise PosedError(f"{self._path} holds no corrections: {error}; move it away to begin anew") from error
-        return {name: correction(value) for name, value in found.items()}
 
     def save(self, name: str, value: Any) -> None:
-        """Keep a correction; raises InvalidArgumentError for a bad name or value, or too many of them."""
-        if not 0 < len(name) <= _MAX_NAME or not name.isprintable():
-            raise InvalidArgumentError(f"a correction's name has 1 to {_MAX_NAME} printable characters, not {name!r}")
+        """Keep a correction.
+
+        Raises InvalidArgumentError for a bad name or value, or too many of them; PosedError if it cannot be kept.
+        """
+        kept = {_checked_name(name): correction(value)}
         with self._locked():
-            corrections = self.load()
-            corrections[name] = correction(value)
+            corrections = {**self.load(), **kept}
             if len(corrections) > _MAX_COUNT:
                 raise InvalidArgumentError(f"{_MAX_COUNT} corrections are kept; delete one first")
             self._write(corrections)
@@ -54,18 +55,27 @@ class CorrectionStore:
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:
         """Keep other threads and other processes from changing the file meanwhile."""
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        # Beside it, not the file itself: that is another one with each change.
-        with Path(f"{self._path}.lock").open("a") as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            yield
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            # Beside it, not the file itself: that is another one with each change.
+            with Path(f"{self._path}.lock").open("a") as lock:
+                fcntl.flock(lock, fcntl.LOCK_EX)
+                yield
+        except OSError as error:
+            raise PosedError(
+                f"cannot keep corrections in {self._path}: {error.strerror}; name another file with --corrections"
+            ) from error
 
     def _write(self, corrections: dict[str, dict[str, Any]]) -> None:
         # Written beside it and moved into place: whoever reads meanwhile gets the one or the other, whole.
         descriptor, written = tempfile.mkstemp(dir=self._path.parent)
-        with os.fdopen(descriptor, "w") as file:
-            json.dump({"corrections": corrections}, file, indent=1)
-        os.replace(written, self._path)
+        try:
+            with os.fdopen(descriptor, "w") as file:
+                json.dump({"corrections": corrections}, file, indent=1)
+            os.replace(written, self._path)
+        except BaseException:
+            os.unlink(written)
+            raise
 
 
 def default_path() -> Path:
@@ -91,11 +101,20 @@ def correction(value: Any) -> dict[str, Any]:
             "longitude": _number(position, "longitude", 180),
             "height": _number(position, "height", 20_000),
         }
+    saved = str(value.get("saved", ""))[:40]
+    if not saved.isprintable():
+        raise InvalidArgumentError(f"saved = {saved!r}; allowed: printable characters")
     return {
         "heading_offset_deg": _number(value, "heading_offset_deg", 360),
         "position": position,
-        "saved": str(value.get("saved", ""))[:40],
+        "saved": saved,
     }
+
+
+def _checked_name(name: str) -> str:
+    if not 0 < len(name) <= _MAX_NAME or not name.isprintable():
+        raise InvalidArgumentError(f"a correction's name has 1 to {_MAX_NAME} printable characters, not {name!r}")
+    return name
 
 
 def _number(values: dict[str, Any], key: str, limit: float) -> float:
