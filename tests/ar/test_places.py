@@ -149,6 +149,7 @@ _MENDED = {
         {"type": "Feature", "properties": [1], "geometry": None},
         "properties = [1]; expected an object",
     ),
+    "half a character": ('{"type": "Feature", "properties": {"name": "\\ud800"}}', "feature 1: '\\ud800' holds half a"),
     "a geometry that is none": (_feature("Circle", [1, 2], name="Pond"), "feature 1 ('Pond'): geometry \"Circle\""),
     "one coordinate": (_feature("Point", [1]), "position [1]; expected [longitude, latitude, height]"),
     "a word": (_feature("Point", ["22°", 40]), 'coordinate "22\\u00b0"; expected a number'.replace("\\u00b0", "°")),

@@ -56,7 +56,7 @@ class _Reader:
         properties = feature.get("properties") or {}
         if not isinstance(properties, dict):
             raise InvalidArgumentError(f"feature {number}: properties = {_shown(properties)}; expected an object")
-        name = _text(properties, _NAMES) or f"Place {number}"
+        name = _text(properties, _NAMES, f"feature {number}") or f"Place {number}"
         what = f"feature {number} ({name!r})"
         ground = properties.get("ground")
         if ground is not None:
@@ -66,8 +66,8 @@ class _Reader:
                 "id": f"{number}" if part == 0 else f"{number}.{part}",
                 "name": name,
                 "kind": kind,
-                "note": _text(properties, _NOTES),
-                "color": _text(properties, _COLORS) or None,
+                "note": _text(properties, _NOTES, what),
+                "color": _text(properties, _COLORS, what) or None,
                 "coordinates": coordinates,
                 "ground": ground,
             }
@@ -217,9 +217,14 @@ def _number(value: Any, what: str, limit: float = math.inf) -> float:
     return float(value)
 
 
-def _text(properties: dict[str, Any], keys: tuple[str, ...]) -> str:
+def _text(properties: dict[str, Any], keys: tuple[str, ...], what: str) -> str:
     """Return the first of the properties that is there, as text."""
-    return next((str(properties[key]) for key in keys if properties.get(key) not in (None, "")), "")
+    text = next((str(properties[key]) for key in keys if properties.get(key) not in (None, "")), "")
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise InvalidArgumentError(f"{what}: {text!r} holds half a character; write it as UTF-8") from None
+    return text
 
 
 def _shown(value: Any) -> str:
