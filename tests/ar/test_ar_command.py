@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -21,3 +22,10 @@ def _said(*options: str) -> str:
 @pytest.mark.parametrize("options", [("--crs", "EPSG:2100"), ("--heights", "geoid:43")])
 def test_how_to_read_a_file_is_said_of_a_file(options: tuple[str, str]) -> None:
     assert "--crs and --heights say how to read the file of --places" in _said(*options)
+
+
+def test_a_runtime_directory_that_cannot_be_made_is_said_before_anybody_follows_a_link(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "nowhere"))
+    assert "cannot make" in _said()

@@ -151,6 +151,11 @@ def test_answers_forbid_what_no_page_needs(served: Served) -> None:
         assert "server" not in headers
 
 
+def test_a_host_that_no_name_can_be_is_named() -> None:
+    with pytest.raises(InvalidArgumentError, match=r"--host 'a\.\.b' is no name of a host"):
+        listen("a..b", 0)
+
+
 def test_a_port_that_is_taken_is_named_with_the_remedy(served: Served) -> None:
     with pytest.raises(InvalidArgumentError, match=rf"{served.port}: Address already in use; give another --port"):
         listen(LOOPBACK, served.port)

@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from posed.binder.runtime import runtime_directory
 from posed.cli.options import add_rate_mode_option, position
 from posed.client.launcher import daemon_listens
 from posed.errors import InvalidArgumentError, MissingExtraError
@@ -108,6 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     corrections = CorrectionStore(arguments.corrections or default_path())
     corrections.load()  # better refused now than when the user saves one
+    runtime_directory()  # so too what would keep the feed from starting
     feed = ServiceFeed(arguments.mode, auto_create=not daemon_listens())
     # uvicorn shuts down in order at a signal and passes it on.
     with contextlib.suppress(KeyboardInterrupt), listen(arguments.host, arguments.port) as bound:

@@ -37,6 +37,8 @@ def listen(host: str, port: int) -> socket.socket:
         except BaseException:
             bound.close()
             raise
+    except UnicodeError as error:
+        raise InvalidArgumentError(f"--host {host!r} is no name of a host: {error}") from error
     except OSError as error:
         raise InvalidArgumentError(
             f"cannot listen at {host} port {port}: {error.strerror}; give another --port (0 takes any that is free)"
