@@ -141,6 +141,17 @@ def test_no_file_outside_the_pages_is_served(served: Served, path: str) -> None:
     assert "root:" not in said
 
 
+def test_a_picture_that_is_gone_meanwhile_is_not_found(tmp_path: Path) -> None:
+    picture = tmp_path / "round.png"
+    picture.write_bytes(b"")
+    content = ArContent({"viewpoint": None, "places": []}, {}, picture)
+    with Served(SilentFeed(), content, CorrectionStore(tmp_path / "corrections.json")) as served:
+        headers = served.enter()
+        assert served.ask("/background", headers=headers)[0] == 200
+        picture.unlink()
+        assert served.ask("/background", headers=headers)[0] == 404
+
+
 def test_answers_forbid_what_no_page_needs(served: Served) -> None:
     for headers in (served.ask("/", headers=served.enter())[1], served.ask("/")[1]):
         assert headers["content-security-policy"].startswith("default-src 'self'")

@@ -87,7 +87,7 @@ class _Ar:
         return JSONResponse(self._content.settings)
 
     async def _background(self, request: Request) -> Response:
-        if self._content.background is None:
+        if self._content.background is None or not self._content.background.is_file():
             return Response(status_code=404)
         return FileResponse(self._content.background)
 
