@@ -235,6 +235,26 @@ def test_places_go_with_the_position_they_were_seen_from(page: Page) -> None:
     assert found == [[1, "1"], [0, None]]
 
 
+@pytest.mark.parametrize(("direction", "names"), [(1, "bcdeabcde"), (-1, "aedcbaedc")])
+def test_steps_pass_every_place_even_of_equal_bearing(page: Page, direction: int, names: str) -> None:
+    stepped = page.evaluate(
+        """async ([direction, count]) => {
+            const { Target } = await import("/page/target.js");
+            const anchors = { d: [0, -1, 0], b: [1, 1, 0], e: [-1, 0, 0], c: [1, 1, 9], a: [0, 1, 0] };
+            const all = Object.entries(anchors).map(([id, anchor]) => ({ id, anchor }));
+            const target = new Target();
+            const ids = [];
+            for (let i = 0; i < count; i++) {
+                target.step({ all }, [0, 0, 0], 0.1, direction);
+                ids.push(target.place.id);
+            }
+            return ids.join("");
+        }""",
+        [direction, len(names)],
+    )
+    assert stepped == names
+
+
 _FREE = {"left": 70, "top": 140, "right": 1272, "bottom": 600}
 _CROSS = {"x": 610, "y": 330, "width": 60, "height": 60}
 

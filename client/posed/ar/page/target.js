@@ -1,5 +1,6 @@
 /** Which place is the target: the one held by a tap, else the one under the blue cross. */
 
+import { wrap } from "./angles.js";
 import { polar } from "./geodesy.js";
 
 // So far from the middle of the screen a place still counts as under the cross.
@@ -45,19 +46,13 @@ export class Target {
 
   /** Hold the next place by bearing, to the right (1) or to the left (-1) of the target or of `heading`. */
   step(places, eye, heading, direction) {
-    const from = this.place === null ? heading : bearingOf(this.place, eye);
-    let best = null;
-    let least = Infinity;
-    for (const place of places.all) {
-      if (place.id === this.place?.id) continue;
-      const turn = direction * (bearingOf(place, eye) - from);
-      const ahead = ((turn % (2 * Math.PI)) + 2 * Math.PI) % (2 * Math.PI);
-      if (ahead < least) {
-        least = ahead;
-        best = place;
-      }
-    }
-    if (best !== null) this.hold(best);
+    // Those of equal bearing stay in the order of `all`: each has one before it and one after it.
+    const sorted = [...places.all].sort((a, b) => bearingOf(a, eye) - bearingOf(b, eye));
+    const at = sorted.findIndex(({ id }) => id === this.place?.id);
+    const left = at === -1 ? sorted.filter((place) => bearingOf(place, eye) < wrap(heading)).length - 1 : at - 1;
+    const right = at === -1 ? left + 1 : at + 1;
+    const next = direction < 0 ? left : right;
+    if (sorted.length > 0) this.hold(sorted.at(next % sorted.length));
   }
 }
 
