@@ -201,6 +201,21 @@ def test_places_with_heights_shift_as_a_whole_until_the_eye_is_far(page: Page) -
     assert origins == [0, 0, 250]
 
 
+def test_a_polygon_across_180_degrees_is_where_its_corners_are(page: Page) -> None:
+    ring = [[179.99, -17, 0], [-179.97, -17, 0], [-179.99, -17.01, 0], [179.99, -17, 0]]
+    position = page.evaluate(
+        """async (raw) => {
+            const { Places } = await import("/page/places.js");
+            const places = new Places();
+            places.load({ viewpoint: null, places: [raw] });
+            places.moveTo({ latitude: -17, longitude: 180, height: 0 });
+            return places.all[0].position;
+        }""",
+        _raw("polygon", [ring]),
+    )
+    assert position["longitude"] == pytest.approx(-179.99)
+
+
 _FRAME = """
     const { Frame } = await import("/page/frame.js");
     const { Scene } = await import("/page/scene.js");

@@ -128,6 +128,14 @@ function positionOf(raw) {
   if (raw.kind === "point") return raw.coordinates[0];
   if (raw.kind === "line") return raw.coordinates[raw.coordinates.length >> 1];
   const corners = raw.coordinates[0].slice(0, -1);
-  const mean = (axis) => corners.reduce((sum, corner) => sum + corner[axis], 0) / corners.length;
-  return [mean(0), mean(1), corners.some((corner) => corner[2] === null) ? null : mean(2)];
+  const mean = (of) => corners.reduce((sum, corner) => sum + of(corner), 0) / corners.length;
+  // The short way from the first corner: across 180 degrees the numbers' own mean lies on the earth's other side.
+  const [first] = corners[0];
+  const longitude = within180(first + mean((corner) => within180(corner[0] - first)));
+  const isKnown = corners.every((corner) => corner[2] !== null);
+  return [longitude, mean((corner) => corner[1]), isKnown ? mean((corner) => corner[2]) : null];
+}
+
+function within180(degrees) {
+  return degrees - 360 * Math.round(degrees / 360);
 }
