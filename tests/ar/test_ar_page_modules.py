@@ -250,6 +250,17 @@ def test_places_go_with_the_position_they_were_seen_from(page: Page) -> None:
     assert found == [[1, "1"], [0, None]]
 
 
+def test_a_new_target_is_drawn_as_such_without_a_new_pose(page: Page) -> None:
+    goes_on = page.evaluate(
+        f"""async (raw) => {{
+            {_FRAME}
+            return [frame.draw(NaN, true), frame.draw(NaN, false), frame.draw(NaN, false)];
+        }}""",
+        _raw("point", [[22, 40.001, 5]]),
+    )
+    assert goes_on == [True, False, False]
+
+
 @pytest.mark.parametrize(("direction", "names"), [(1, "bcdeabcde"), (-1, "aedcbaedc")])
 def test_steps_pass_every_place_even_of_equal_bearing(page: Page, direction: int, names: str) -> None:
     stepped = page.evaluate(
@@ -268,6 +279,31 @@ def test_steps_pass_every_place_even_of_equal_bearing(page: Page, direction: int
         [direction, len(names)],
     )
     assert stepped == names
+
+
+def test_the_top_view_is_drawn_anew_when_the_places_were_worked_out_anew(page: Page) -> None:
+    drawn = page.evaluate(
+        """async (raw) => {
+            const { Places } = await import("/page/places.js");
+            const { Thumbnail } = await import("/page/thumbnail.js");
+            const canvas = document.querySelector("#thumbnail");
+            let count = 0;
+            canvas.getContext("2d").fillRect = () => count++;
+            const thumbnail = new Thumbnail(canvas);
+            thumbnail.resize();
+            const places = new Places();
+            places.load({ viewpoint: null, places: [raw] });
+            const counts = [null, 40, 40, 40.01].map((latitude) => {
+                const eye = places.moveTo(latitude && { latitude, longitude: 22, height: 0 });
+                thumbnail.draw(places, null, eye, 1, 0.5);
+                return count;
+            });
+            delete canvas.getContext("2d").fillRect;
+            return counts;
+        }""",
+        _raw("point", [[22.001, 40, 5]]),
+    )
+    assert drawn == [1, 2, 2, 3]
 
 
 _FREE = {"left": 70, "top": 140, "right": 1272, "bottom": 600}

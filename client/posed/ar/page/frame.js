@@ -87,7 +87,7 @@ export class Frame {
     if (byPose === null) return isMoving;
     if (isNewPose || isForced || isAhead) this._drawOverlay(byPose);
     this._measure(truth, scene.truthIsLost(bootMs));
-    return isMoving || (isAhead && Math.hypot(...pose.w) > 1e-3);
+    return isMoving || this._isForced || (isAhead && Math.hypot(...pose.w) > 1e-3);
   }
 
   /** The camera's true orientation by the truth, or by the pose where there is none. */

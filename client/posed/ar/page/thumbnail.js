@@ -13,6 +13,7 @@ export class Thumbnail {
     this._canvas = canvas;
     this._context = canvas.getContext("2d");
     this._drawn = "";
+    this._drawnPlaces = null;
   }
 
   resize() {
@@ -30,8 +31,9 @@ export class Thumbnail {
   draw(places, target, eye, heading, halfView) {
     // A degree is less than a pixel here: between them there is nothing new to draw.
     const key = `${target?.id} ${Math.round(heading * 57.3)} ${Math.round(halfView * 57.3)} ${eye[0].toFixed(1)} ${eye[1].toFixed(1)}`;
-    if (key === this._drawn) return;
+    if (key === this._drawn && places.all === this._drawnPlaces) return;
     this._drawn = key;
+    this._drawnPlaces = places.all;
     const context = this._context;
     const size = this._width;
     const east = target === null ? 0 : target.anchor[0] - eye[0];
