@@ -306,6 +306,32 @@ def test_the_top_view_is_drawn_anew_when_the_places_were_worked_out_anew(page: P
     assert drawn == [1, 2, 2, 3]
 
 
+def test_a_camera_allowed_twice_is_opened_once_and_closed(page: Page) -> None:
+    states = page.evaluate(
+        """async () => {
+            const { Background } = await import("/page/background.js");
+            const pending = [];
+            navigator.mediaDevices.getUserMedia = () => new Promise((allow) => pending.push(allow));
+            const streamOf = () => {
+                const canvas = document.createElement("canvas");
+                canvas.getContext("2d").fillRect(0, 0, 9, 9);
+                return canvas.captureStream();
+            };
+            const background = new Background(document.querySelector("#stage"), () => {});
+            const streams = [streamOf(), streamOf()];
+            const shown = ["camera", "world", "camera"].map((view) => background.show(view));
+            streams.forEach((stream, i) => pending[i](stream));
+            await shown[2];
+            const states = () => streams.map((stream) => stream.getTracks()[0].readyState);
+            const open = states();
+            await background.show("world");
+            delete navigator.mediaDevices.getUserMedia;
+            return [open, states()];
+        }"""
+    )
+    assert states == [["live", "ended"], ["ended", "ended"]]
+
+
 _FREE = {"left": 70, "top": 140, "right": 1272, "bottom": 600}
 _CROSS = {"x": 610, "y": 330, "width": 60, "height": 60}
 

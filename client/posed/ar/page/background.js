@@ -92,7 +92,8 @@ export class Background {
       audio: false,
       video: { facingMode: { ideal: "environment" }, width: { ideal: 1280 } },
     });
-    if (this.view !== "camera") {
+    // Asked for twice, while the user was still to allow it, it may be open already.
+    if (this.view !== "camera" || this._video.srcObject !== null) {
       for (const track of stream.getTracks()) track.stop();
       return;
     }
