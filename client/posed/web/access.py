@@ -2,7 +2,8 @@
 
 Loopback is open to every user of the machine, and through a browser to every site its user visits. So the link holds
 a token that works once and buys a session cookie, requests have to name this server as their host, and those that
-change something or open a WebSocket have to come from its own pages.
+change something or open a WebSocket have to come from its own pages. Cookies know no ports: a browser sends the
+session to every other server on the same host that its user visits as well, so visit none of somebody else's.
 """
 
 import hmac
