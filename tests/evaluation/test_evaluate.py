@@ -86,6 +86,19 @@ def test_a_damaged_rotation_vector_skips_its_trial_alone(tmp_path: Path) -> None
     assert "rotation-vector.txt" in skipped.reason
 
 
+def test_trials_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    for place, seconds in ((".", 4.0), ("monday", 5.0), ("tuesday/am", 6.0)):
+        (tmp_path / place).mkdir(parents=True, exist_ok=True)
+        write_csv_trial(tmp_path / place / "walk.csv", seconds)
+    write_csv_trial(tmp_path / "monday" / "run.csv", 4.0)
+    write_broad_trial(tmp_path / "walk.mat", 6.0)
+    found = evaluate(find_trials([tmp_path]), Plan(("dcm",), ("GAME",)), jobs=1)
+    assert [each.trial for each in found.results] == ["run", "monday/walk", "tuesday/am/walk", "walk", "walk"]
+    assert len({(each.dataset, each.trial) for each in found.results}) == 5
+    (table,) = [each for each in tables(found) if each.title.startswith("csv: total error of each trial")]
+    assert len(table.rows) == 4
+
+
 def test_a_plan_is_checked_before_anything_is_read() -> None:
     for plan, said in (
         (Plan(("best",)), "no filter is named 'best'"),

@@ -5,7 +5,7 @@ import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -94,8 +94,8 @@ def evaluate(
     """Evaluate trials (see `find_trials`), `jobs` at a time (default: one a core); `on_trial` is called after each.
 
     Errors do not depend on the number of jobs; CPU times are measurements. A trial that cannot be read is skipped and
-    kept as such. Raises what Plan.check does, MissingExtraError if a reader is missing, and InvalidStateError if a
-    process was killed.
+    kept as such; trials of one name are told apart by the folders they lie in. Raises what Plan.check does,
+    MissingExtraError if a reader is missing, and InvalidStateError if a process was killed.
     """
     plan.check()
     jobs = min(jobs or len(os.sched_getaffinity(0)), len(trials))
@@ -103,9 +103,9 @@ def evaluate(
     for path, outcome in _outcomes(trials, plan, jobs):
         done[path] = outcome
         on_trial(path)
-    outcomes = [done[path] for path in trials]
-    results = tuple(result for each in outcomes if not isinstance(each, Skipped) for result in each)
-    return Evaluation(plan, results, tuple(each for each in outcomes if isinstance(each, Skipped)))
+    outcomes = [(path, done[path]) for path in trials]
+    results = _told_apart([(path, each) for path, each in outcomes if not isinstance(each, Skipped)])
+    return Evaluation(plan, results, tuple(each for _, each in outcomes if isinstance(each, Skipped)))
 
 
 def evaluate_trial(trial: Trial, plan: Plan) -> tuple[Result, ...]:
@@ -157,6 +157,19 @@ def _outcome(path: Path, plan: Plan) -> tuple[Result, ...] | Skipped:
         return evaluate_trial(load_trial(path, plan.calibration), plan)
     except RecordingError as error:
         return Skipped(str(path), str(error))
+
+
+def _told_apart(found: Sequence[tuple[Path, tuple[Result, ...]]]) -> tuple[Result, ...]:
+    """Return all results, their trials named with the folders below those they share if another has the same name."""
+    placed = [(path.parent.resolve(), each) for path, results in found for each in results]
+    folders: dict[tuple[str, str], set[Path]] = {}
+    for folder, each in placed:
+        folders.setdefault((each.dataset, each.trial), set()).add(folder)
+    shared = {key: os.path.commonpath(alike) for key, alike in folders.items()}
+    return tuple(
+        replace(each, trial=str(folder.relative_to(shared[each.dataset, each.trial]) / each.trial))
+        for folder, each in placed
+    )
 
 
 def _maker(name: str) -> Callable[[], OrientationFilter]:
