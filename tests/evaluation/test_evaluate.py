@@ -86,6 +86,17 @@ def test_a_damaged_rotation_vector_skips_its_trial_alone(tmp_path: Path) -> None
     assert "rotation-vector.txt" in skipped.reason
 
 
+def test_a_trial_without_a_gyroscope_that_counts_is_skipped_alone(tmp_path: Path) -> None:
+    write_csv_trial(tmp_path / "a.csv", 4.0)
+    path = write_csv_trial(tmp_path / "b.csv", 4.0)
+    path.write_text(re.sub(r"^(gyroscope,\d+),.*", r"\1,nan,nan,nan", path.read_text(), flags=re.MULTILINE))
+    found = evaluate(find_trials([tmp_path]), Plan(("dcm",), ("native", "UI")), jobs=1)
+    assert [(each.trial, each.mode) for each in found.results] == [("a", "native"), ("a", "UI")]
+    (skipped,) = found.skipped
+    assert skipped.path == str(path)
+    assert "trial 'b' has no gyroscope sample left at mode UI" in skipped.reason
+
+
 def test_trials_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
     for place, seconds in ((".", 4.0), ("monday", 5.0), ("tuesday/am", 6.0)):
         (tmp_path / place).mkdir(parents=True, exist_ok=True)

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from posed.clock import VirtualClock
-from posed.errors import InvalidArgumentError
+from posed.errors import InvalidArgumentError, RecordingError
 from posed.evaluation.trial import INPUTS, Trial
 from posed.events import EventBatch, FlatEvent, RateMode
 from posed.fusion.event_arrays import EventArrays
@@ -33,7 +33,10 @@ def mode_events(trial: Trial, mode: ModeName, profile: DeviceProfile | None = No
 
 
 def mode_batch(trial: Trial, mode: ModeName, profile: DeviceProfile | None = None) -> EventBatch:
-    """Return a trial's events at a mode as columns by sensor type; see `mode_events`."""
+    """Return a trial's events at a mode as columns by sensor type; see `mode_events`.
+
+    Raises RecordingError if a sensor has none left.
+    """
     if mode not in MODES:
         raise InvalidArgumentError(f"mode {mode!r} is unknown; allowed: {', '.join(MODES)}")
     columns = {kind: trial.recording.columns[kind] for kind in INPUTS}
@@ -44,7 +47,14 @@ def mode_batch(trial: Trial, mode: ModeName, profile: DeviceProfile | None = Non
     for kind in INPUTS:
         source.batch(int(kind), RateMode[mode].sampling_period_us * 1000, 0)
         source.activate(int(kind), True)
-    return source.drain(recording.end_ns)
+    batch = source.drain(recording.end_ns)
+    for kind in INPUTS:
+        if int(kind) not in batch.columns:
+            raise RecordingError(
+                f"trial {trial.name!r} has no {kind.name.lower()} sample left at mode {mode}; check its values:"
+                " those that are not finite do not count"
+            )
+    return batch
 
 
 def event_arrays(batch: EventBatch) -> EventArrays:
