@@ -294,6 +294,19 @@ def test_a_recording_without_samples_is_refused() -> None:
         Recording("void", {SensorType.GYROSCOPE: column}, {})
 
 
+@pytest.mark.parametrize("days", [30, 31])
+def test_a_recording_of_more_than_30_days_has_a_wrong_stamp(days: int) -> None:
+    end_ns = days * 86_400_000_000_000
+    gyroscope, _ = in_time_order(np.array([0, 5], np.int64), np.zeros((2, 3)))
+    accelerometer, _ = in_time_order(np.array([7, end_ns], np.int64), np.zeros((2, 3)))
+    columns = {SensorType.GYROSCOPE: gyroscope, SensorType.ACCELEROMETER: accelerometer}
+    if days == 30:
+        assert Recording("long", columns, {}).end_ns == end_ns
+        return
+    with pytest.raises(RecordingError, match=f"recording 'long' goes from 0 ns to {end_ns} ns; .*time column .* unit"):
+        Recording("long", columns, {})
+
+
 def write_csv(folder: Path, content: str, sidecar: str | None = None) -> Path:
     path = folder / "walk.csv"
     path.write_text(content)

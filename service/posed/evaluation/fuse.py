@@ -1,6 +1,7 @@
 """A whole recording turned into poses, without a daemon and without waiting."""
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from operator import attrgetter
 
 from posed.clock import VirtualClock
@@ -37,7 +38,7 @@ def fuse_recording(
     for name in filters:
         service.register_pose(name, pose_period_us, sampling_period_us, name)
     end_ns = recording.end_ns - recording.start_ns
-    for now_ns in (*range(step_ns, end_ns, step_ns), end_ns):
+    for now_ns in chain(range(step_ns, end_ns, step_ns), (end_ns,)):
         clock.advance_to(now_ns)
         service.advance()
         yield from sorted(service.take_poses(), key=_instant_of)

@@ -13,6 +13,8 @@ from posed.errors import RecordingError
 from posed.events import EventColumn, Float64Array, Int64Array, SensorType, Truth
 
 _STATUS_ACCURACY_HIGH = 3
+_LONGEST_NS = 30 * 86_400_000_000_000
+"""Of a recording. One stamp that is far off would else have grids and poses made for all the years between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +93,11 @@ class Recording:
     def __post_init__(self) -> None:
         if not any(len(column) for column in self.columns.values()):
             raise RecordingError(f"recording {self.name!r} holds no sample; expected at least one sensor's rows")
+        if self.end_ns - self.start_ns > _LONGEST_NS:
+            raise RecordingError(
+                f"recording {self.name!r} goes from {self.start_ns} ns to {self.end_ns} ns; expected at most 30 days:"
+                " check the time column and its unit"
+            )
 
     @cached_property
     def truth(self) -> TruthTrack | None:
