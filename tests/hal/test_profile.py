@@ -235,6 +235,11 @@ soft_iron = [[1.1, 0, 0], [0, 0.9, 0.05], [0, 0.05, 1]]
         ("rates_hz = [15, 50]", "rates_hz = [15, 15]", "accelerometer.rates_hz = [15, 15]", "none twice"),
         ("rates_hz = [15, 50]", "rates_hz = [0, 15]", "accelerometer.rates_hz = [0, 15]", "above 0"),
         ("rates_hz = [15, 50]", "rates_hz = [nan]", "accelerometer.rates_hz = [nan]", "above 0"),
+        ("rates_hz = [15, 50]", "rates_hz = [1e-7, 200]", "rates_hz = [1e-07, 200.0]", "from 0.01 up to 1000 Hz"),
+        ("max_range = 40", f"max_range = {10**400}", "accelerometer.max_range = 1000", "a number above 0"),
+        ("rates_hz = [15, 50]", f"rates_hz = [15, {10**400}]", "accelerometer.rates_hz = [15, 1000", "ascending"),
+        ("noise_density = 0.1", "noise_density = 0.1\nversion = 10000000000", "version = 10000000000", "2147483647"),
+        ("noise_density = 0.1", "noise_density = 0.1\nfifo_max = 2147483648", "fifo_max = 2147483648", "2147483647"),
         ("rates_hz = [15, 50]", "rates_hz = [2000]", "accelerometer.rates_hz = [2000.0]", "up to 1000 Hz"),
         (
             "noise_density = 0.1",
@@ -315,6 +320,11 @@ def test_unknown_key_names_the_allowed_ones_and_the_nearest(tmp_path: Path) -> N
 def test_files_that_are_no_profile(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match=r"mine\.toml: not TOML: "):
         load_profile(write(tmp_path, "name = "))
+    for beyond in ("1" * 5000, f"0x{'f' * 5000}", "[" * 3000 + "]" * 3000):
+        with pytest.raises(ProfileError, match=r"mine\.toml: not TOML: an integer of thousands of digits, or arrays"):
+            load_profile(write(tmp_path, f"name = {beyond}\n"))
+    with pytest.raises(ProfileError, match="nested too deep"):
+        load_profile(write(tmp_path, f"name{'.a' * 3000} = 1\n"))
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"')
     with pytest.raises(ProfileError, match=r"latin\.toml: not TOML: "):
         load_profile(str(tmp_path / "latin.toml"))

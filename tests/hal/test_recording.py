@@ -431,6 +431,8 @@ def test_broken_csv_is_named_with_line_and_column(tmp_path: Path, content: str, 
         ),
         ('["ax", "ay", "az"]', '["ax", "ay", "up"]', r"\[sensors.accelerometer\] columns names 'up'"),
         ("[sensors.gyroscope]", "[sensors.gyroscope", "walk.toml is not TOML"),
+        ('unit = "us"', f"unit = {'1' * 5000}", "walk.toml is not TOML: an integer of thousands of digits"),
+        ('unit = "us"', f"unit = {'[' * 3000}{']' * 3000}", "walk.toml is not TOML: .* nested too deep"),
     ],
 )
 def test_broken_mapping_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:

@@ -29,7 +29,6 @@ sensor are all empty has no sample of it; six columns are three values and their
 import csv
 import io
 import math
-import tomllib
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -41,6 +40,7 @@ import numpy as np
 from posed.errors import RecordingError
 from posed.events import STANDARD_GRAVITY, EventColumn, SensorType
 from posed.hal.recording import Recording, TruthTrack, in_time_order, read_text
+from posed.hal.toml_table import parse_toml
 
 _T = TypeVar("_T")
 
@@ -236,8 +236,8 @@ def _mapped_layout(path: Path, names: list[str], sidecar: Path) -> _Layout:
 
 def _mapping(sidecar: Path) -> Mapping[str, Any]:
     try:
-        return tomllib.loads(read_text(sidecar))
-    except tomllib.TOMLDecodeError as error:
+        return parse_toml(read_text(sidecar))
+    except ValueError as error:
         raise RecordingError(f"{sidecar} is not TOML: {error}") from error
 
 

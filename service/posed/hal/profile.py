@@ -1,7 +1,6 @@
 """Device profiles: what a phone's parts can do, read from TOML, and the rates they answer a request with."""
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +13,7 @@ from posed.errors import InvalidArgumentError, ProfileError
 from posed.events import ReportingMode, SensorInfo, SensorType
 from posed.hal.calibration import Calibration
 from posed.hal.quantisation import as_listed
-from posed.hal.toml_table import TomlTable, close_match
+from posed.hal.toml_table import TomlTable, close_match, parse_toml
 
 UNCALIBRATED_TYPE: Mapping[SensorType, SensorType] = {
     SensorType.ACCELEROMETER: SensorType.ACCELEROMETER_UNCALIBRATED,
@@ -312,8 +311,8 @@ def _sensor_info(part: SensorProfile, kind: SensorType) -> SensorInfo:
 
 def _parse(file: str, content: bytes) -> DeviceProfile:
     try:
-        values = tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        values = parse_toml(content.decode())
+    except ValueError as error:
         raise ProfileError(f"{file}: not TOML: {error}") from error
     root = TomlTable(file, "", values)
     name = root.text("name")
@@ -355,8 +354,8 @@ def _read_ambient(kind: SensorType, table: TomlTable) -> AmbientPart:
     table.finish()
     if part.resolution > part.max_range:
         raise table.refusal("resolution", part.resolution, f"at most max_range, {part.max_range}")
-    if samples and part.rates_hz[-1] > _HIGHEST_RATE_HZ:
-        raise table.refusal("rates_hz", list(part.rates_hz), f"rates up to {_HIGHEST_RATE_HZ} Hz")
+    if samples:
+        _check_rates(table, part.rates_hz)
     return part
 
 
@@ -388,13 +387,19 @@ def _read_sensor(kind: SensorType, table: TomlTable) -> SensorProfile:
         raise table.refusal("delay_s", sensor.delay_s, f"seconds up to {_LONGEST_DELAY_S}, usually thousandths")
     if sensor.resolution > sensor.max_range:
         raise table.refusal("resolution", sensor.resolution, f"at most max_range, {sensor.max_range}")
-    if sensor.rates_hz[-1] > _HIGHEST_RATE_HZ:
-        raise table.refusal("rates_hz", list(sensor.rates_hz), f"rates up to {_HIGHEST_RATE_HZ} Hz")
+    _check_rates(table, sensor.rates_hz)
     return sensor
+
+
+def _check_rates(table: TomlTable, rates_hz: tuple[float, ...]) -> None:
+    if rates_hz[0] < _LOWEST_RATE_HZ or rates_hz[-1] > _HIGHEST_RATE_HZ:
+        raise table.refusal("rates_hz", list(rates_hz), f"rates from {_LOWEST_RATE_HZ} up to {_HIGHEST_RATE_HZ} Hz")
 
 
 _LONGEST_DELAY_S = 0.1
 """What filters make good; the low-passes of phone parts take a tenth of it."""
+_LOWEST_RATE_HZ = 0.01
+"""Slower than any part; a period is exact to a millionth of a hertz."""
 _HIGHEST_RATE_HZ = 1000
 """Android's sensor service asks no sensor for a period below 1 ms (SensorDevice.cpp, MINIMUM_EVENTS_PERIOD)."""
 

@@ -1,14 +1,31 @@
 """Read a TOML table strictly: every complaint names the file, the key, the value and what is allowed."""
 
 import itertools
-import math
+import sys
+import tomllib
 from collections.abc import Iterable, Mapping
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from posed.errors import ProfileError
 from posed.events import Float64Array
+
+_LARGEST_INTEGER = 2**31 - 1
+"""What Android's and the wire's integers hold."""
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the values of a TOML file; raises ValueError, which says what is wrong, if it is none."""
+    try:
+        values = tomllib.loads(text)
+        # A complaint shows the value: one that cannot be shown is refused here.
+        repr(values)
+    except tomllib.TOMLDecodeError:
+        raise
+    except (ValueError, RecursionError):
+        raise ValueError("an integer of thousands of digits, or arrays or tables nested too deep") from None
+    return values
 
 
 class TomlTable:
@@ -31,10 +48,10 @@ class TomlTable:
         return value
 
     def integer(self, key: str, *, low: int, default: int | None = None) -> int:
-        """Return an integer not below `low`."""
-        allowed = f"an integer, {low} or more"
+        """Return an integer from `low` to 2**31 - 1."""
+        allowed = f"an integer, {low} or more, at most {_LARGEST_INTEGER}"
         value = self._take(key, default, allowed)
-        if not isinstance(value, int) or isinstance(value, bool) or value < low:
+        if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= _LARGEST_INTEGER:
             raise self.refusal(key, value, allowed)
         return value
 
@@ -125,7 +142,8 @@ def close_match(word: str, words: Iterable[str]) -> str:
 
 
 def _is_finite_number(value: object) -> TypeGuard[int | float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    # Compared, not converted: an integer may be larger than any float.
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _is_row(value: object) -> bool:
