@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from posed.hal.profile import load_profile
 from posed.sensors import Client, SensorService, device_errors, make_device_filter
 from posed.sensors.connection import SensorEventConnection
 from posed.sensors.declination import declination_at
-from posed.sensors.detectors import DeviceOrientation, Persistence, SignificantMotion, Tilt
+from posed.sensors.detectors import DeviceOrientation, Persistence, Rule, SignificantMotion, Tilt
 from posed.sensors.fused_events import heading, orientation_angles
 from posed.sensors.steps import Gait, StepFinder
 from posed.sensors.virtual import ACTIVITY_RECOGNITION
@@ -301,6 +301,32 @@ def test_persistence_begins_anew_when_it_is_broken() -> None:
     still, moved = (0.0, 0.0, 9.81), (1.5, 0.0, 9.81)
     assert _held(Persistence(moving=False, seconds=5), (4, still), (0.2, moved), (4, still)) == []
     assert _held(SignificantMotion(), (30, still)) == []
+
+
+@pytest.mark.parametrize(
+    ("make", "held"),
+    [
+        (lambda: Persistence(moving=False, seconds=5), [(0.0, 0.0, 9.81)]),
+        (lambda: Persistence(moving=True, seconds=5), [(1.5, 0.0, 9.81), (-1.5, 0.0, 9.81)]),
+        (SignificantMotion, [(0.0, 0.0, 8.0), (0.0, 0.0, 12.0)]),
+    ],
+)
+def test_persistence_does_not_count_across_a_gap(
+    make: Callable[[], Rule], held: Sequence[tuple[float, float, float]]
+) -> None:
+    def told(rule: Rule, begun_s: float, seconds: float) -> list[float]:
+        samples = [(begun_s + index * 0.02, held[index % len(held)]) for index in range(round(seconds * 50))]
+        return [at_s for at_s, sample in samples if rule(round(1e9 * at_s), sample) is not None]
+
+    (needed_s, *_) = told(make(), 0.0, 12.0)
+    rule = make()
+    assert told(rule, 0.0, needed_s) == []
+    (first_s, *_) = told(rule, 3600.0, 12.0)
+    assert first_s == pytest.approx(3600.0 + needed_s)
+    # A sample or two that are lost are no gap.
+    rule = make()
+    assert told(rule, 0.0, needed_s) == []
+    assert told(rule, needed_s + 0.4, 0.02) == [needed_s + 0.4]
 
 
 def _steps_of(intervals_s: Sequence[float]) -> int:

@@ -9,6 +9,8 @@ from posed.sensors.virtual import Computation
 
 _LARGEST = 10_000.0
 """m/s2. A sample beyond it, or with NaN, is no measurement, for the filters neither."""
+_LONGEST_GAP_NS = 500_000_000
+"""Behind a longer one a detector counts anew: nobody knows what the phone did meanwhile."""
 _Vector = tuple[float, float, float]
 
 
@@ -149,11 +151,15 @@ class Persistence:
         self._moving = moving
         self._seconds = seconds
         self._samples: list[_Vector] = []
+        self._before_ns = 0
         self._begun_ns = 0
         self._mean: list[float] | None = None
         self._count = 0
 
     def __call__(self, timestamp_ns: int, acceleration: _Vector) -> float | None:
+        if timestamp_ns - self._before_ns > _LONGEST_GAP_NS:
+            self._samples, self._mean, self._count = [], None, 0
+        self._before_ns = timestamp_ns
         if not self._samples:
             self._begun_ns = timestamp_ns
         self._samples.append(acceleration)
@@ -186,10 +192,14 @@ class SignificantMotion:
 
     def __init__(self) -> None:
         self._sizes: list[float] = []
+        self._before_ns = 0
         self._begun_ns = 0
         self._count = 0
 
     def __call__(self, timestamp_ns: int, acceleration: _Vector) -> float | None:
+        if timestamp_ns - self._before_ns > _LONGEST_GAP_NS:
+            self._sizes, self._count = [], 0
+        self._before_ns = timestamp_ns
         if not self._sizes:
             self._begun_ns = timestamp_ns
         self._sizes.append(math.hypot(*acceleration))
