@@ -1,5 +1,6 @@
 """Filters over trials: the same whoever computes it, whatever cannot be read, and what it comes to."""
 
+import base64
 import json
 import math
 import re
@@ -208,6 +209,16 @@ def test_html_stands_alone(evaluation: Evaluation) -> None:
         assert outside.startswith("data:"), outside
     assert "<script" not in page
     assert "y.mat is not a readable MATLAB file" in page
+
+
+def test_html_shows_every_filter_where_the_phones_own_is_the_first(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    root = write_attitude_set(tmp_path / "phone", ["P_AR"])
+    found = evaluate(find_trials([root]), Plan((PHONE, "dcm"), ("GAME",)), jobs=1)
+    page = as_html(found)
+    assert "Total error by trial, GAME" in page
+    pictures = [base64.b64decode(each).decode() for each in re.findall(r"svg\+xml;base64,([^\"]*)", page)]
+    assert all(">phone<" in each and ">dcm<" in each for each in pictures)
 
 
 def test_names_are_escaped_in_the_reports() -> None:

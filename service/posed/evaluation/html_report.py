@@ -26,10 +26,11 @@ def as_html(evaluation: Evaluation) -> str:
     results = evaluation.results
     colour = colours(evaluation.plan.filters)
     shown = tables(evaluation)
+    # Not that of the first result: the phone's own are native, whatever was asked for.
+    mode = evaluation.plan.modes[0]
     parts = []
     for dataset in dict.fromkeys(result.dataset for result in results):
         own = [result for result in results if result.dataset == dataset]
-        mode = own[0].mode
         groups = group_summaries(own)
         parts.append(f"<h2>{escape(dataset)}</h2>")
         parts.append(_plot("Mean total error by mode", bars_of_modes(summaries(own), colour)))
