@@ -16,6 +16,7 @@ from posed.hal import open_source, rotation
 from posed.hal.calibration import Calibration
 from posed.hal.motion import Target, make_script
 from posed.hal.profile import DeviceProfile, ResidualErrors, load_profile
+from posed.hal.sensor_model import _RandomWalk
 from posed.hal.simulated import SimulatedPhone
 from posed.hal.source import SensorSource
 
@@ -458,6 +459,17 @@ class TestErrors:
         np.testing.assert_allclose(fast.values[9::10], slow.values, atol=1e-9)
         minutes = np.diff(slow.values[299::300], axis=0)
         assert minutes.std() == pytest.approx(1e-3 * math.sqrt(60), rel=0.25)
+
+    def test_a_bias_that_wanders_takes_no_more_memory_as_time_goes_on(self) -> None:
+        times = np.arange(0.0, 100_000.0, 7.0)
+        walk = _RandomWalk(1e-3, [1, 2], 100.0)
+        values = np.concatenate([walk.at(times[start : start + 50]) for start in range(0, len(times), 50)])
+        assert len(walk._nodes) < 1000
+        np.testing.assert_array_equal(values, _RandomWalk(1e-3, [1, 2], 1e6).at(times))
+        np.testing.assert_array_equal(walk.at(times[70:80]), values[70:80])
+        constant = _RandomWalk(0.0, [1, 2], 100.0)
+        assert not constant.at(times).any()
+        assert len(constant._nodes) == 1
 
     def test_uncalibrated_streams_are_raw_with_the_bias_beside(self) -> None:
         matrix = np.array([[1.1, 0.02, 0.0], [0.02, 0.95, 0.01], [0.0, 0.01, 1.0]])

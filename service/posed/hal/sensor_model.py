@@ -58,7 +58,8 @@ class SensorModel:
         self._errors += rng.uniform(-1.0, 1.0, (3, 3)) * (1.0 - np.eye(3)) * bounds.misalignment
         soft_iron = rng.uniform(-1.0, 1.0, (3, 3)) * bounds.soft_iron
         self._errors += 0.5 * (soft_iron + soft_iron.T)
-        self._walk = _RandomWalk(part.bias_walk, self._key)
+        # A part's streams, whatever their rates, stand within two blocks of its slowest rate.
+        self._walk = _RandomWalk(part.bias_walk, self._key, 2 * BLOCK_SAMPLES / part.rates_hz[0])
 
     def block(
         self, rate_hz: float, index: int, joins: tuple[int, int] | None = None
@@ -123,23 +124,37 @@ def _joined(grid_ns: Int64Array, row: int, since_ns: int) -> Int64Array:
 
 
 class _RandomWalk:
-    """A bias on three axes that wanders from zero, known at nodes 10 s apart and straight between them."""
+    """A bias on three axes that wanders from zero, known at nodes 10 s apart and straight between them.
+
+    kept_s: how far behind the newest times asked for nodes are kept; older ones are made again when they are needed.
+    """
 
     _NODE_S = 10.0
     _CHUNK = 256
 
-    def __init__(self, density: float, key: list[int]) -> None:
+    def __init__(self, density: float, key: list[int], kept_s: float) -> None:
         self._step = density * self._NODE_S**0.5
         self._key = key
+        self._kept = int(kept_s / self._NODE_S) + 1
+        self._first = 0
+        """The node that `_nodes` begins with."""
         self._nodes = np.zeros((1, 3))
 
     def at(self, t: Float64Array) -> Float64Array:
         """Return the bias at the ascending times `t` (s), float64[n, 3]."""
+        if self._step == 0.0:
+            return np.zeros((len(t), 3))
         at_node = t / self._NODE_S
         node = at_node.astype(np.int64)
-        while len(self._nodes) < node[-1] + 2:
-            chunk = len(self._nodes) // self._CHUNK
+        if node[0] < self._first:
+            self._first, self._nodes = 0, np.zeros((1, 3))
+        while self._first + len(self._nodes) < node[-1] + 2:
+            chunk = (self._first + len(self._nodes)) // self._CHUNK
             steps = SeededRandom(*self._key, chunk).normal((self._CHUNK, 3)) * self._step
             self._nodes = np.concatenate([self._nodes, self._nodes[-1] + np.cumsum(steps, axis=0)])
-        before = self._nodes[node]
-        return before + (at_node - node)[:, np.newaxis] * (self._nodes[node + 1] - before)
+            if self._first + self._CHUNK <= node[0] - self._kept:
+                self._first += self._CHUNK
+                self._nodes = self._nodes[self._CHUNK :]
+        row = node - self._first
+        before = self._nodes[row]
+        return before + (at_node - node)[:, np.newaxis] * (self._nodes[row + 1] - before)
