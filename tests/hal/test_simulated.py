@@ -253,6 +253,17 @@ class TestSource:
         source.activate(GYROSCOPE, True)
         assert_same(drained(source, 5, GYROSCOPE), whole[int(np.searchsorted(whole.timestamp_ns, now_ns, "right")) :])
 
+    @pytest.mark.parametrize("seed", range(6))
+    def test_no_stale_sample_where_jitter_has_a_block_begin_too_early(self, seed: int) -> None:
+        shaky = changed(TABLET, timestamp_jitter_s=0.002)
+        whole = drained(phone(shaky, handles=(GYROSCOPE,), seed=seed)[0], 5, GYROSCOPE)
+        source, clock = phone(shaky, handles=(ACCELEROMETER,), seed=seed)
+        # Sample 256 is the last of its block; the one behind it may stand before this instant, short of its own.
+        now_ns = START + 2569 * SECOND // 2000
+        clock.advance_to(now_ns)
+        source.activate(GYROSCOPE, True)
+        assert_same(drained(source, 5, GYROSCOPE), whole[int(np.searchsorted(whole.timestamp_ns, now_ns, "right")) :])
+
     def test_flush_completes_once_a_call_in_order(self) -> None:
         source, _ = phone()
         for handle in (GYROSCOPE, ACCELEROMETER, GYROSCOPE):

@@ -187,6 +187,9 @@ class _Stream:
         passed = exact_period_ns(rate_hz).samples_in(after_ns - zero_ns)
         self._load(max(passed - 1, 0) // BLOCK_SAMPLES)
         self._seek(bisect_right(self._stamps, after_ns))
+        # The next block begins with one that jitter put before after_ns too.
+        if self.next_ns <= after_ns:
+            self._seek(bisect_right(self._stamps, after_ns))
         if since_ns is not None:
             # Jitter may have put the last sample before the change, and this one, of the same instant, behind it.
             if self._instant_ns(self._offset + 1) <= since_ns:
