@@ -184,6 +184,14 @@ def test_a_csv_without_truth_is_no_trial(tmp_path: Path) -> None:
         load_trial(path)
 
 
+@pytest.mark.parametrize("header", ['"sensor","timestamp_ns","x","y","z","w"', "\n , \n\nsensor, timestamp_ns,x,y,z,w"])
+def test_a_csv_is_found_by_the_header_it_is_read_by(tmp_path: Path, header: str) -> None:
+    path = write_csv_trial(tmp_path / "walk.csv")
+    path.write_text(path.read_text().replace("sensor,timestamp_ns,x,y,z,w", header, 1))
+    assert find_trials([tmp_path]) == [path]
+    assert load_trial(path).name == "walk"
+
+
 def test_trials_are_found_at_any_depth_and_once(tmp_path: Path) -> None:
     root = write_attitude_set(tmp_path / "b" / "set", ["A_NoDist_AR", "B_Dist_AR"])
     (tmp_path / "a").mkdir()

@@ -122,13 +122,13 @@ def has_truth(path: Path) -> bool:
     if sidecar.exists():
         return _TRUTH in _mapping(sidecar)
     try:
-        with path.open(encoding="utf-8-sig") as file:
-            header = file.readline(1000)
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            _, header = next(_numbered(path, csv.reader(file, skipinitialspace=True)), (0, []))
     except (OSError, UnicodeDecodeError) as error:
         raise RecordingError(f"{path} cannot be read as text ({error})") from error
-    if not header.strip():
+    if not header:
         raise RecordingError(f"{path} is empty; expected a header")
-    names = [name.strip() for name in header.split(",")]
+    names = [name.strip() for name in header]
     return names[: len(_OWN_HEADER)] == _OWN_HEADER and "w" in names
 
 
