@@ -106,6 +106,20 @@ def test_a_phone_calibrated_of_its_own_recordings(tmp_path: Path, compress: bool
     assert np.degrees(total_error(truth[~lost], quaternion(t[~lost]))).max() < 0.05
 
 
+@pytest.mark.parametrize("span", ["3-2", "2-2", "nan-3", "2-inf", "2", "a-b"])
+def test_an_excluded_span_that_is_none_is_named(tmp_path: Path, span: str) -> None:
+    root = write_attitude_set(tmp_path / "set", ["A_NoDist_AR"], excluded=f"1-1.5 {span}")
+    with pytest.raises(RecordingError, match=f"trials.csv excludes '{span}' from A_NoDist_AR; expected .* FROM before"):
+        load_trial(root / "trials" / "A_NoDist_AR")
+
+
+def test_a_list_of_trials_that_is_no_csv_is_named(tmp_path: Path) -> None:
+    root = write_attitude_set(tmp_path / "set", ["A_NoDist_AR"])
+    (root / "trials.csv").write_text("trial,motion\nB," + "4" * 200_000 + "\n")
+    with pytest.raises(RecordingError, match=r"trials\.csv is not comma-separated text"):
+        load_trial(root / "trials" / "A_NoDist_AR")
+
+
 def test_a_phone_with_androids_calibration(tmp_path: Path) -> None:
     root = write_attitude_set(tmp_path / "set", ["A_Dist_AR"])
     shutil.rmtree(root / "calibration")

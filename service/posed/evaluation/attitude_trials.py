@@ -8,6 +8,7 @@ stillness, both plain or gzipped.
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
@@ -75,9 +76,12 @@ def load_attitude_trial(folder: Path, calibration: CalibrationChoice) -> Trial:
 
 def _listed(root: Path, name: str) -> Mapping[str, str]:
     path = root / "trials.csv"
-    for row in csv.DictReader(io.StringIO(read_text(path), newline="")):
-        if row.get("trial") == name:
-            return {key: value for key, value in row.items() if key and value}
+    try:
+        for row in csv.DictReader(io.StringIO(read_text(path), newline="")):
+            if row.get("trial") == name:
+                return {key: value for key, value in row.items() if key and value}
+    except csv.Error as error:
+        raise RecordingError(f"{path} is not comma-separated text ({error}); copy it again") from error
     return {}
 
 
@@ -94,9 +98,12 @@ def _outside(folder: Path, truth: TruthTrack, excluded: str) -> BoolArray:
         try:
             first, last = (float(edge) for edge in span.split("-"))
         except ValueError:
+            first = last = math.nan
+        if not -math.inf < first < last < math.inf:
             raise RecordingError(
-                f"trials.csv excludes {span!r} from {folder.name}; expected spans FROM-TO in seconds, blanks between"
-            ) from None
+                f"trials.csv excludes {span!r} from {folder.name}; expected spans FROM-TO in seconds, FROM before TO,"
+                " blanks between"
+            )
         counted &= (seconds < first) | (seconds > last)
     return counted
 
