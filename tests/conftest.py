@@ -10,9 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
+
+# A busy machine is no fault of what is tested.
+settings.register_profile("posed", settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("posed")
 
 _PATIENCE_S = 20.0
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")

@@ -229,7 +229,7 @@ _JSON = st.recursive(
 )
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=_JSON)
 def test_whatever_a_file_holds_it_is_read_or_refused(write: Write, content: Any) -> None:
     path = write(content)

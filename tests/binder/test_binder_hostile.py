@@ -146,7 +146,7 @@ def lasting_server() -> Iterator[ServerThread]:
         server.stop()
 
 
-fuzz = settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+fuzz = settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 valid = st.builds(
     transaction,
     call_id=st.integers(0, 2**32 - 1),

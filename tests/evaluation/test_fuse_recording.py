@@ -41,7 +41,7 @@ def _poses(mode: RateMode, step_ns: int, pose_period_us: int = 100_000) -> list[
     )
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     st.sampled_from([RateMode.NORMAL, RateMode.UI, RateMode.GAME, RateMode.FASTEST]),
     st.integers(2_000_000, 5_000_000_000),

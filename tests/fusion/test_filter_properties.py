@@ -47,7 +47,7 @@ def fresh(name: str) -> Any:
 
 
 @every_filter
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(events=streams(), cuts=st.lists(st.integers(0, 400), max_size=8))
 def test_cuts_do_not_change_a_bit(name: str, events: FlatEvents, cuts: list[int]) -> None:
     whole = fresh(name)
@@ -66,7 +66,7 @@ def test_cuts_do_not_change_a_bit(name: str, events: FlatEvents, cuts: list[int]
 
 
 @every_filter
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(events=streams(), at=st.integers(0, 400))
 def test_saving_in_the_middle_does_not_change_a_bit(name: str, events: FlatEvents, at: int) -> None:
     whole = fresh(name)
@@ -81,7 +81,7 @@ def test_saving_in_the_middle_does_not_change_a_bit(name: str, events: FlatEvent
 
 
 @every_filter
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(events=streams())
 def test_the_state_stays_finite_and_the_answer_a_rotation(name: str, events: FlatEvents) -> None:
     one = fresh(name)
@@ -98,7 +98,7 @@ def rows(c: DirectionCosines) -> Float64Array:
     return np.array([[c.east_x, c.east_y, c.east_z], [c.north_x, c.north_y, c.north_z], [c.up_x, c.up_y, c.up_z]])
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(streams())
 def test_the_matrix_of_dcm_stays_a_rotation(events: FlatEvents) -> None:
     dcm = DcmFilter()
@@ -111,7 +111,7 @@ def test_the_matrix_of_dcm_stays_a_rotation(events: FlatEvents) -> None:
 
 
 @pytest.mark.parametrize("name", ["dcm-adaptive", "game", "geomag"])
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(events=streams())
 def test_the_matrix_of_dcm_adaptive_stays_a_rotation_and_its_bias_in_bounds(name: str, events: FlatEvents) -> None:
     adaptive = fresh(name)

@@ -75,7 +75,7 @@ def test_it_says_what_it_takes_the_bias_for(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(cuts=st.lists(st.integers(0, 4500), max_size=5))
 def test_the_result_does_not_depend_on_how_the_events_were_cut(name: str, swung: FlatEvents, cuts: list[int]) -> None:
     at_once, in_parts = made(name), made(name)

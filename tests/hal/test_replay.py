@@ -182,7 +182,7 @@ def test_a_rate_change_takes_effect_from_the_last_drained_instant() -> None:
     assert_same(source.drain(LAST).columns[GYRO], fast[51:])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     changes=st.lists(
         st.tuples(st.integers(1, 700 * MS), st.sampled_from([0, 20 * MS, 66_667_000, 200 * MS])),
@@ -379,7 +379,7 @@ operations = st.lists(
 )
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 @given(
     operations=operations,
     cuts=st.lists(st.integers(0, 8000 * MS), max_size=12),

@@ -105,7 +105,7 @@ class TestSource:
         wild = changed(TABLET, timestamp_jitter_s=1.0)
         assert np.diff(drained(phone(wild)[0], 60, GYROSCOPE).timestamp_ns).min() > 0
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(
         cuts=st.lists(st.integers(0, 6 * SECOND), max_size=12),
         periods_us=st.lists(st.sampled_from([0, 5_000, 20_000, 66_667, 200_000]), min_size=6, max_size=6),
