@@ -2,6 +2,7 @@
 
 import itertools
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -31,6 +32,12 @@ class _Listener:
     def on_sensor_changed(self, event: SensorEvent) -> None:
         self._on_event(event)
         self.called.set()
+
+
+def _ended(client: Any) -> None:
+    """Wait until the client's thread has ended: nothing is called after that."""
+    client._service._thread.join(10)
+    assert not client._service._thread.is_alive()
 
 
 def test_a_pose_callback_may_change_everything(desk: Any) -> None:
@@ -74,6 +81,43 @@ def test_a_sensor_callback_may_unregister_flush_and_register(desk: Any) -> None:
         assert manager.register_listener(first, gyroscope, SENSOR_DELAY_GAME)
         assert other.called.wait(5)
         assert len(manager.get_statistics().listeners) == 1
+
+
+def test_a_pose_callback_slower_than_the_poses_holds_up_neither_calls_nor_close(desk: Any) -> None:
+    desk.serve("--source", "sim:still")
+    calls = 0
+    closed = threading.Event()
+
+    def on_pose(pose: Any) -> None:
+        nonlocal calls
+        calls += 1
+        time.sleep(0.02)
+        if calls == 20:
+            client.close()
+            closed.set()
+
+    client = PoseClient(pose_rate_hz=200, on_pose=on_pose)
+    client.wait_connected()
+    client.set_pose_rate(199)
+    client.set_pose_rate(200)
+    assert closed.wait(10)
+    _ended(client)
+    assert calls == 20
+
+
+def test_a_manager_closed_in_a_callback_calls_no_more(desk: Any) -> None:
+    desk.serve("--source", "sim:still")
+    manager = SensorManager()
+    gyroscope = manager.get_default_sensor(Sensor.TYPE_GYROSCOPE)
+    events: list[SensorEvent] = []
+
+    def close(event: SensorEvent) -> None:
+        events.append(event)
+        manager.close()
+
+    assert manager.register_listener(_Listener(close), gyroscope, SENSOR_DELAY_FASTEST, 500_000)
+    _ended(manager)
+    assert len(events) == 1
 
 
 def test_a_change_of_the_pose_rate_counts_no_gap(desk: Any) -> None:

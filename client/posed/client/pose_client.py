@@ -236,12 +236,12 @@ class PoseClient:
         self._sockets.append(socket)
 
         def read() -> None:
-            while not socket.closed:
-                try:
-                    frame = socket.recv(zmq.NOBLOCK)
-                except zmq.Again:
-                    return
-                take(frame[len(topic) :])
+            # One a turn: with more, a callback slower than the poses would keep calls and `close` waiting.
+            try:
+                frame = socket.recv(zmq.NOBLOCK)
+            except zmq.Again:
+                return
+            take(frame[len(topic) :])
 
         self._service.watch(socket, read)
 

@@ -97,6 +97,12 @@ class ListenerRegistry:
         queue = self._queues.get(id(listener))
         return 0 if queue is None else queue.events_dropped
 
+    def clear(self) -> None:
+        """End every registration on this side: of what has arrived no listener is told any more."""
+        with self._lock:
+            for queue in (*self._queues.values(), *self._triggers.values()):
+                queue.registrations.clear()
+
     # On the service thread
 
     def restore(self, sensor_service: Proxy, sensors: Mapping[int, Sensor]) -> None:

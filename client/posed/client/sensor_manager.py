@@ -268,6 +268,7 @@ class SensorManager(SensorMaths):
 
     def close(self) -> None:
         """End all events and unbind. Never takes longer than a second."""
+        self._registry.clear()
         self._service.close()
         for stream in list(self._streams):
             stream.end()
