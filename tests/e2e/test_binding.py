@@ -200,6 +200,27 @@ def test_a_hanging_daemon_is_unavailable(desk: Any, stop_process: Callable[[int]
             manager.get_statistics()
 
 
+def test_binding_twice_on_one_connection_keeps_the_registrations(desk: Any, eventually: Eventually) -> None:
+    desk.serve("--source", "sim:still")
+    listener = _Listener()
+    told: list[bool] = []
+    with SensorManager(on_service_connected=lambda: told.append(True)) as manager:
+        gyroscope = manager.get_default_sensor(Sensor.TYPE_GYROSCOPE)
+        assert manager.register_listener(listener, gyroscope, SENSOR_DELAY_GAME)
+        # Had it been too slow before, to answer in time.
+        manager._service.run(manager._service._connected)
+        listener.called.clear()
+        assert listener.called.wait(5)
+        assert [sensor.registrations for sensor in manager.get_statistics().sensors if sensor.handle == 4] == [1]
+        assert len(told) == 2
+        # Lost, there again, lost and there again, all while a callback kept the thread: one connection to bind.
+        manager._service.run(lambda: manager._service._links.extend((False, True, False, True)))
+        eventually(lambda: len(told) > 2)
+        listener.called.clear()
+        assert listener.called.wait(5)
+        assert len(told) == 3
+
+
 def test_what_the_returned_daemon_lacks_does_not_cost_the_rest(desk: Any, tmp_path: Any) -> None:
     daemon = desk.serve("--source", "sim:still")
     lacking = tmp_path / "lacking.csv"

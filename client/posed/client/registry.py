@@ -116,6 +116,8 @@ class ListenerRegistry:
             queue.accuracies.clear()
             for handle, registration in list(queue.registrations.items()):
                 try:
+                    # A daemon that was slow to answer may have it: it would refuse it, and stand by its old periods.
+                    self._disable_sensor(queue, handle)
                     self._enable_or_stream(queue, registration)
                 except RemoteError as error:
                     # The daemon that returned may have another phone: what it lacks is no reason to lose the rest.
@@ -174,6 +176,10 @@ class ListenerRegistry:
             )
         )
 
+    def _disable_sensor(self, queue: EventQueue, handle: int) -> None:
+        """Undo `_enable`; a sensor that the daemon does not know of is no error."""
+        self._proxy.disableSensor(sensors_pb2.DisableSensorRequest(listener=queue.name, handle=handle))
+
     def _remove(self, queues: dict[int, _Queue], listener: object, sensor: Sensor | None) -> bool:
         with self._lock:
             queue = queues.get(id(listener))
@@ -189,7 +195,7 @@ class ListenerRegistry:
 
     def _disable(self, queue: EventQueue, handles: Iterable[int]) -> None:
         for handle in handles:
-            self._proxy.disableSensor(sensors_pb2.DisableSensorRequest(listener=queue.name, handle=handle))
+            self._disable_sensor(queue, handle)
         if not queue.registrations:
             self._remove_callback(queue.name)
 

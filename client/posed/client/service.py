@@ -208,10 +208,10 @@ class Service:
         more = self._connection.process()
         while self._links:
             more = True
-            if self._links.pop(0):
-                self._connected()
-            else:
+            if not self._links.pop(0):
                 self._disconnected()
+            elif not self._links:  # of a connection that is lost by now there is nothing to bind
+                self._connected()
         while self._requests and self._state is ServiceState.CONNECTED:
             more = True
             self._serve(*self._requests.popleft())
@@ -276,8 +276,9 @@ class Service:
     def _disconnected(self) -> None:
         self._binding.release(self)
         was = self._state
-        if self._farewell is not None:
-            self._die(self._farewell)
+        farewell, self._farewell = self._farewell, None
+        if farewell is not None:
+            self._die(farewell)
         elif was is not ServiceState.BINDING_DIED:
             self._set_state(ServiceState.DISCONNECTED, "the daemon went away without a word; waiting for its return")
             if was is ServiceState.CONNECTED:
