@@ -137,10 +137,29 @@ def test_with_a_handler_callbacks_run_when_it_is_pumped() -> None:
     _send(queue, (4, [1], [0]))
     _send(queue, (4, [2], [0]), flushes=(4,))
     assert listener.said == []
-    assert handler.run_pending() == 1
+    assert handler.run_pending() == 3
     assert listener.said == [(4, 1, 0), (4, 2, 0), ("flushed", 4)]
     _send(queue, (4, [3], [0]))
     assert handler.run_pending() == 1
+
+
+def test_a_callback_that_ends_the_handlers_run_is_the_last_and_the_rest_waits() -> None:
+    class Quitting(Listener):
+        def on_sensor_changed(self, event: SensorEvent) -> None:
+            super().on_sensor_changed(event)
+            if event.timestamp == 1:
+                handler.quit()
+            if event.timestamp == 2:
+                raise SystemExit
+
+    listener, handler = Quitting(), Handler()
+    _send(_queue(listener, GYRO, handler=handler), (4, [1, 2, 3], [0]))
+    handler.run()
+    assert listener.said == [(4, 1, 0)]
+    with pytest.raises(SystemExit):
+        handler.run_pending()
+    assert handler.run_pending() == 1
+    assert listener.said == [(4, 1, 0), (4, 2, 0), (4, 3, 0)]
 
 
 def test_a_handler_that_nobody_pumps_loses_the_oldest_events_but_no_flush_complete() -> None:

@@ -2,6 +2,8 @@
 
 import threading
 
+import pytest
+
 from posed.client import Handler
 
 
@@ -34,3 +36,32 @@ def test_run_ends_when_a_callback_says_so() -> None:
     assert ran == ["first"]
     handler.post(handler.quit)
     handler.run()
+
+
+def test_a_callback_that_raises_leaves_the_others_waiting() -> None:
+    handler = Handler()
+    ran: list[str] = []
+    handler.post(lambda: [][0])
+    handler.post(lambda: ran.append("next"))
+    with pytest.raises(IndexError):
+        handler.run_pending()
+    assert handler.run_pending() == 1
+    assert ran == ["next"]
+
+
+def test_what_is_posted_meanwhile_runs_the_next_time() -> None:
+    handler = Handler()
+    handler.post(lambda: handler.post(lambda: None))
+    assert handler.run_pending() == 1
+    assert handler.run_pending() == 1
+
+
+def test_quit_comes_before_what_waits() -> None:
+    handler = Handler()
+    ran: list[str] = []
+    handler.post(handler.quit)
+    handler.post(lambda: ran.append("later"))
+    handler.run()
+    assert ran == []
+    assert handler.run_pending() == 1
+    assert ran == ["later"]

@@ -78,7 +78,7 @@ class EventQueue(Stub):
                 self._dispatch(arrival)
             return
         with self._lock:
-            was_empty = not self._arrivals and not self._spared
+            waited = len(self._arrivals) + len(self._spared)
             self._arrivals.extend(arrivals)
             self._events_waiting += len(arrivals) - len(request.flush_completes)
             while self._events_waiting > _BACKLOG:
@@ -88,8 +88,10 @@ class EventQueue(Stub):
                 else:
                     self._events_waiting -= 1
                     self._dropped_here += 1
-        if was_empty and arrivals:
-            self._handler.post(self._dispatch_waiting)
+            waiting = len(self._arrivals) + len(self._spared)
+        # One each: then the handler may quit after any of them, and one that raises costs none of the others.
+        for _ in range(waiting - waited):
+            self._handler.post(self._dispatch_next)
 
     def take_event(self, registration: Registration, arrival: _Arrival) -> None:
         """Call the listener for an event of a sensor it has."""
@@ -98,8 +100,8 @@ class EventQueue(Stub):
     def take_flush_complete(self, sensor: Sensor) -> None:
         """Call the listener for a flush-complete."""
 
-    def _dispatch_waiting(self) -> None:
-        while (arrival := self._next_waiting()) is not None:
+    def _dispatch_next(self) -> None:
+        if (arrival := self._next_waiting()) is not None:
             self._dispatch(arrival)
 
     def _next_waiting(self) -> _Arrival | None:

@@ -28,11 +28,11 @@ class Handler:
                 remaining = deadline - time.monotonic()
                 if remaining <= 0 or not self._changed.wait(remaining):
                     break
-            callbacks = list(self._waiting)
-            self._waiting.clear()
-        for callback in callbacks:
-            callback()
-        return len(callbacks)
+            waiting = len(self._waiting)
+        ran = 0
+        while ran < waiting and self._run_next():
+            ran += 1
+        return ran
 
     def run(self) -> None:
         """Run callbacks as they come, until `quit`."""
@@ -42,10 +42,19 @@ class Handler:
                 if self._quitting:
                     self._quitting = False
                     return
-            self.run_pending()
+            self._run_next()
 
     def quit(self) -> None:
         """End `run`; from any thread, a callback included."""
         with self._changed:
             self._quitting = True
             self._changed.notify()
+
+    def _run_next(self) -> bool:
+        """Run what waits longest; False if nothing does. What it raises costs none of the others."""
+        with self._changed:
+            if not self._waiting:
+                return False
+            callback = self._waiting.popleft()
+        callback()
+        return True
