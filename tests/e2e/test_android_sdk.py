@@ -79,6 +79,9 @@ def test_most_failures_are_false_and_few_are_exceptions(desk: Any) -> None:
         assert not manager.register_listener(listener, motion, SENSOR_DELAY_GAME)
         assert not manager.register_listener(listener, gyroscope, -1)
         assert not manager.register_listener(listener, gyroscope, SENSOR_DELAY_GAME, -1)
+        for period, latency in ((2**31, 0), ("1", 0), (0.5, 0), (0, 2**63), (0, 0.5)):
+            with pytest.raises(InvalidArgumentError):
+                manager.register_listener(listener, gyroscope, period, latency)  # type: ignore[arg-type]
         assert manager.register_listener(listener, gyroscope, SENSOR_DELAY_NORMAL)
         assert not manager.register_listener(listener, gyroscope, SENSOR_DELAY_FASTEST)
         assert {s.requested_period_us for s in manager.get_statistics().sensors} == {200_000}
@@ -249,6 +252,30 @@ def test_dynamic_sensors_come_and_go(desk: Any, eventually: Eventually) -> None:
         desk.tell_phone("dynamic", True)
         eventually(lambda: len(manager.get_dynamic_sensor_list()) == 1)
         assert len(said) == 2
+
+
+def test_a_dynamic_sensor_callback_may_have_one_of_its_methods_only(desk: Any, eventually: Eventually) -> None:
+    daemon = desk.serve_bench_phone()
+
+    class Coming:
+        def __init__(self) -> None:
+            self.said: list[str] = []
+
+        def on_dynamic_sensor_connected(self, sensor: Sensor) -> None:
+            self.said.append(sensor.name)
+
+    coming = Coming()
+    with SensorManager() as manager:
+        assert manager.register_listener(Listener(), _sensor(manager, Sensor.TYPE_GYROSCOPE), SENSOR_DELAY_GAME)
+        manager.register_dynamic_sensor_callback(coming)  # type: ignore[arg-type]
+        desk.tell_phone("dynamic", True)
+        eventually(lambda: coming.said == ["Clip-on"])
+        daemon.kill()
+        daemon.wait()
+        desk.serve_bench_phone()
+        eventually(lambda: coming.said == ["Clip-on"] * 2)
+        desk.tell_phone("dynamic", False)
+        eventually(lambda: manager.get_dynamic_sensor_list() == [])
 
 
 def test_clients_see_a_gap_and_no_error_when_the_phone_is_lost_and_found(desk: Any, eventually: Eventually) -> None:

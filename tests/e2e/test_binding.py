@@ -19,7 +19,7 @@ from posed.client import (
     SensorManager,
     ServiceState,
 )
-from posed.errors import ServiceUnavailableError
+from posed.errors import InvalidArgumentError, ServiceUnavailableError
 
 Eventually = Callable[[Callable[[], object]], None]
 
@@ -198,6 +198,35 @@ def test_a_hanging_daemon_is_unavailable(desk: Any, stop_process: Callable[[int]
         stop_process(daemon.pid)
         with pytest.raises(ServiceUnavailableError):
             manager.get_statistics()
+
+
+@pytest.mark.parametrize(
+    "arguments", [{"rate_mode": 2**31}, {"rate_mode": "1"}, {"rate_mode": 1e4}, {"filter": b"dcm"}, {"filter": 1}]
+)
+def test_arguments_that_no_call_can_carry_are_refused_before_they_are_kept(desk: Any, arguments: Any) -> None:
+    with pytest.raises(InvalidArgumentError):
+        PoseClient(**arguments)
+
+
+def test_a_pose_client_keeps_its_rate_mode_when_a_bad_one_is_refused(desk: Any) -> None:
+    desk.serve("--source", "sim:still")
+    with PoseClient(SENSOR_DELAY_NORMAL) as client:
+        client.wait_connected()
+        for bad in (2**31, "fast"):
+            with pytest.raises(InvalidArgumentError):
+                client.set_rate_mode(bad)  # type: ignore[arg-type]
+        client.set_pose_rate(50)
+        assert client.rate_mode == "NORMAL"
+
+
+def test_waiting_for_a_pose_ends_with_a_binding_that_failed(desk: Any) -> None:
+    desk.serve("--source", "sim:still")
+    with PoseClient(filter="\udc80") as client:  # no call can carry it: half of a character
+        waiting = threading.Thread(target=client.next_pose, daemon=True)
+        waiting.start()
+        waiting.join(10)
+        assert not waiting.is_alive()
+        assert client.state is ServiceState.BINDING_DIED
 
 
 def test_binding_twice_on_one_connection_keeps_the_registrations(desk: Any, eventually: Eventually) -> None:

@@ -86,11 +86,17 @@ class DynamicSensors(Stub):
 def _tell(callback: DynamicSensorCallback, handler: Handler | None, gone: list[Sensor], come: list[Sensor]) -> None:
     def tell() -> None:
         for sensor in gone:
-            call_back(callback.on_dynamic_sensor_disconnected, sensor)
+            _call_if_there(callback, "on_dynamic_sensor_disconnected", sensor)
         for sensor in come:
-            call_back(callback.on_dynamic_sensor_connected, sensor)
+            _call_if_there(callback, "on_dynamic_sensor_connected", sensor)
 
     if handler is None:
         tell()
     elif gone or come:
         handler.post(tell)
+
+
+def _call_if_there(callback: DynamicSensorCallback, method: str, sensor: Sensor) -> None:
+    called = getattr(callback, method, None)
+    if called is not None:
+        call_back(called, sensor)

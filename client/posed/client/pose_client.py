@@ -54,7 +54,7 @@ class PoseClient:
     ) -> None:
         self._sampling_period_us = _sampling_period_us(rate_mode)
         self._pose_period_us = _pose_period_us(pose_rate_hz)
-        self._filter = filter
+        self._filter = _filter_name(filter)
         self._every = every
         self._on_pose = on_pose
         self._on_truth = on_truth
@@ -136,7 +136,7 @@ class PoseClient:
     def next_pose(self, timeout_s: float | None = None) -> Pose | None:
         """Return the next pose; None when `timeout_s` passes without one, or once closed and what had come is taken."""
         with self._arrived:
-            self._arrived.wait_for(lambda: self._waiting or self.state is ServiceState.CLOSED, timeout_s)
+            self._arrived.wait_for(lambda: self._waiting or self._service.has_ended, timeout_s)
             if not self._waiting:
                 return None
             return self._hand_out(self._waiting.popleft())
@@ -185,6 +185,8 @@ class PoseClient:
         self._poses = None
         self._topic = b""
         self._close_sockets()
+        with self._arrived:
+            self._arrived.notify_all()  # it may be the end
 
     def _register(self, poses: Proxy) -> None:
         registration = poses.registerPose(
@@ -192,7 +194,7 @@ class PoseClient:
                 listener=_LISTENER,
                 pose_period_us=self._pose_period_us,
                 sampling_period_us=self._sampling_period_us,
-                filter=self._filter or "",
+                filter=self._filter,
             )
         )
         self._configured(registration.configuration)
@@ -290,6 +292,12 @@ def _sampling_period_us(rate_mode: int) -> int:
     if period_us < 0:
         raise InvalidArgumentError(f"rate mode {rate_mode} is negative; give a SENSOR_DELAY code or a period in us")
     return period_us
+
+
+def _filter_name(filter: str | None) -> str:
+    if filter is not None and not isinstance(filter, str):
+        raise InvalidArgumentError(f"filter {filter!r} is no name; give a str, or None for the daemon's first")
+    return filter or ""
 
 
 def _pose_period_us(pose_rate_hz: float) -> int:

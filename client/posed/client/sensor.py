@@ -1,8 +1,10 @@
 """Sensors and their events as Android's SDK has them (android.hardware.Sensor, SensorEvent, TriggerEvent)."""
 
+import numbers
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+from posed.errors import InvalidArgumentError
 from posed.proto import sensors_pb2
 
 SENSOR_DELAY_FASTEST = 0
@@ -25,8 +27,18 @@ _DELAY_US = {
 
 
 def period_of_delay_us(rate: int) -> int:
-    """Return the period (us) of a SENSOR_DELAY code; any other int is a period already (SensorManager.getDelay)."""
-    return _DELAY_US.get(rate, rate)
+    """Return the period (us) of a SENSOR_DELAY code; any other int is a period already (SensorManager.getDelay).
+
+    Raises InvalidArgumentError for what is no int of 32 bits: no call could carry it.
+    """
+    return _DELAY_US.get(check_us(rate, 32), rate)
+
+
+def check_us(duration_us: int, bits: int) -> int:
+    """Return a period or latency (us); raises InvalidArgumentError if it is no int of so many bits."""
+    if not isinstance(duration_us, numbers.Integral) or not -(2 ** (bits - 1)) <= duration_us < 2 ** (bits - 1):
+        raise InvalidArgumentError(f"{duration_us!r} is no period or latency in us; give an int of {bits} bits")
+    return duration_us
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +179,7 @@ class TriggerEventListener(Protocol):
 
 
 class DynamicSensorCallback(Protocol):
-    """What register_dynamic_sensor_callback takes."""
+    """What register_dynamic_sensor_callback takes; either method may be left out."""
 
     def on_dynamic_sensor_connected(self, sensor: Sensor) -> None:
         """Take note of a sensor that came."""

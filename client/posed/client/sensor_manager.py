@@ -19,6 +19,7 @@ from posed.client.sensor import (
     Sensor,
     SensorEventListener,
     TriggerEventListener,
+    check_us,
     period_of_delay_us,
 )
 from posed.client.service import Service
@@ -169,9 +170,10 @@ class SensorManager(SensorMaths):
         listeners ask; an extension of posed's, for Android delivers to all what the fastest asks.
 
         Returns False, as Android does, for a missing listener or sensor, a one-shot sensor, a negative period or
-        latency, or a sensor the listener already has, whose rate is not changed by it. Raises InvalidStateError beyond
-        128 listeners, PermissionDeniedError for a debuggable package that asks for more than 200 Hz and may not have
-        it, ServiceUnavailableError if no daemon answers.
+        latency, or a sensor the listener already has, whose rate is not changed by it. Raises InvalidArgumentError for
+        a period or latency that no int of 32 or 64 bits holds, InvalidStateError beyond 128 listeners,
+        PermissionDeniedError for a debuggable package that asks for more than 200 Hz and may not have it,
+        ServiceUnavailableError if no daemon answers.
         """
         if listener is None or sensor is None:
             _log.error("register_listener needs a listener and a sensor")
@@ -180,7 +182,7 @@ class SensorManager(SensorMaths):
             _log.error("%s is a one-shot sensor: use request_trigger_sensor", sensor.name)
             return False
         period_us = period_of_delay_us(sampling_period_us)
-        if period_us < 0 or max_report_latency_us < 0:
+        if period_us < 0 or check_us(max_report_latency_us, 64) < 0:
             _log.error("sampling period %d us and latency %d us must not be negative", period_us, max_report_latency_us)
             return False
         self._check_rate(sensor, period_us)

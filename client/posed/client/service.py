@@ -65,6 +65,7 @@ class Service:
         self._farewell: str | None = None
         self._retry_at: float | None = None
         self._started_at = float("-inf")
+        self._thread_ended = False
         self._extra: dict[Socket, Callable[[], None]] = {}
         self.context: Context = context()
         self.directory = runtime_directory()
@@ -82,6 +83,11 @@ class Service:
     def state(self) -> ServiceState:
         """Where the binding stands now."""
         return self._state
+
+    @property
+    def has_ended(self) -> bool:
+        """True once closed, or failed for good: the binding's `release` is called when it has become so."""
+        return self._thread_ended or self._state is ServiceState.CLOSED
 
     def wait_connected(self, timeout_s: float) -> None:
         """Wait until a daemon is connected.
@@ -190,6 +196,7 @@ class Service:
             _log.exception("the binding failed")
             self._die(f"the client failed: {error!r}; bind again")
         finally:
+            self._thread_ended = True
             self._binding.release(self)
             self._connection.close()
             self._fail_requests()
