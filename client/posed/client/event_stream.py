@@ -56,12 +56,14 @@ class EventStream:
         arrived = asyncio.Event()
         self._wake = lambda: loop.call_soon_threadsafe(arrived.set)
         try:
-            while not self._ended:
+            while True:
                 arrived.clear()
+                ended = self._ended  # what came before the end is in the queue by now
                 while self._events:
                     yield self._events.popleft()
-                if not self._ended:
-                    await arrived.wait()
+                if ended:
+                    return
+                await arrived.wait()
         finally:
             self._wake = None
             self.close()
