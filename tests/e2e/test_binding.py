@@ -229,6 +229,58 @@ def test_waiting_for_a_pose_ends_with_a_binding_that_failed(desk: Any) -> None:
         assert client.state is ServiceState.BINDING_DIED
 
 
+def test_calls_that_wait_when_the_client_closes_end_with_the_promised_error(desk: Any) -> None:
+    desk.serve("--source", "sim:still")
+    kept, free = threading.Event(), threading.Event()
+
+    def keep() -> None:
+        kept.set()
+        free.wait(10)
+
+    ends: list[BaseException | None] = []
+
+    def wait() -> None:
+        try:
+            manager.get_statistics()
+        except ServiceUnavailableError as error:
+            ends.append(error)
+
+    manager = SensorManager()
+    manager.wait_connected()
+    service = manager._service
+    keeping = threading.Thread(target=service.run, args=(keep,))
+    keeping.start()
+    assert kept.wait(5)
+    with pytest.raises(ServiceUnavailableError):
+        service.run(keep, 0.0)  # given up, and still in the queue
+    waiting = threading.Thread(target=wait)
+    waiting.start()
+    manager.close()
+    free.set()
+    _ended(manager)
+    waiting.join()
+    keeping.join()
+    assert len(ends) == 1
+    assert service._wake_fd is None
+    assert service.context.closed
+
+
+def test_a_callback_on_the_bindings_thread_does_not_wait_for_itself(desk: Any) -> None:
+    daemon = desk.serve("--source", "sim:still")
+    told = threading.Event()
+
+    def wait() -> None:
+        try:
+            manager.wait_connected(60)
+        except ServiceUnavailableError:
+            told.set()
+
+    with SensorManager(on_service_disconnected=wait) as manager:
+        manager.wait_connected()
+        daemon.kill()
+        assert told.wait(10)
+
+
 def test_binding_twice_on_one_connection_keeps_the_registrations(desk: Any, eventually: Eventually) -> None:
     desk.serve("--source", "sim:still")
     listener = _Listener()

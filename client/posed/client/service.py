@@ -22,7 +22,7 @@ from posed.binder.stub import Caller, Stub
 from posed.client.binding import Binding, ServiceState, call_back
 from posed.client.launcher import ensure_daemon
 from posed.client.package import Package
-from posed.errors import InvalidStateError, PosedError, ServiceUnavailableError
+from posed.errors import PosedError, ServiceUnavailableError
 from posed.proto import binder_pb2, service_manager_pb2
 
 _log = logging.getLogger(__name__)
@@ -92,8 +92,11 @@ class Service:
     def wait_connected(self, timeout_s: float) -> None:
         """Wait until a daemon is connected.
 
-        Raises ServiceUnavailableError with the reason after `timeout_s`, at once if the binding died or was closed.
+        Raises ServiceUnavailableError with the reason after `timeout_s`, at once if the binding died or was closed, or
+        in a callback on the binding's own thread, which would wait for itself.
         """
+        if threading.current_thread() is self._thread:
+            timeout_s = 0.0
         waiting = (ServiceState.CONNECTING, ServiceState.DISCONNECTED)
         with self._changed:
             self._changed.wait_for(lambda: self._state not in waiting, timeout_s)
@@ -322,7 +325,9 @@ class Service:
 
     def _fail_requests(self) -> None:
         while self._requests:
-            self._requests.popleft()[1].set_exception(InvalidStateError("the client was closed"))
+            _, future = self._requests.popleft()
+            if future.set_running_or_notify_cancel():
+                future.set_exception(ServiceUnavailableError(f"posed is {self._state.value}: {self.reason}"))
 
     def _call_back(self, callback: Callable[..., None] | None, *arguments: Any) -> None:
         if callback is not None:
