@@ -19,6 +19,7 @@ class Daemon:
 
     def __init__(self) -> None:
         self.enabled: list[tuple[int, int]] = []
+        self.disabled: list[int] = []
         self.refuses: Callable[[Any], bool] = lambda request: False
 
     def enableSensor(self, request: Any) -> None:
@@ -27,7 +28,7 @@ class Daemon:
         self.enabled.append((request.handle, request.max_report_latency_us))
 
     def disableSensor(self, request: Any) -> None:
-        pass
+        self.disabled.append(request.handle)
 
 
 class Service:
@@ -38,15 +39,19 @@ class Service:
     def __init__(self) -> None:
         self.connection = self
         self.callbacks: set[str] = set()
+        self.posted: list[Callable[[], Any]] = []
 
     def run(self, action: Callable[[], Any]) -> Any:
         return action()
+
+    def post(self, action: Callable[[], Any]) -> None:
+        self.posted.append(action)
 
     def add_callback(self, name: str, stub: Any) -> None:
         self.callbacks.add(name)
 
     def remove_callback(self, name: str) -> None:
-        self.callbacks.remove(name)
+        self.callbacks.discard(name)
 
 
 class Listener:
@@ -95,6 +100,43 @@ def test_a_daemon_that_returns_is_asked_for_all_of_it_again(registry: ListenerRe
     registry.restore(returned, {})  # type: ignore[arg-type]
     assert returned.enabled == [(1, 0)]
     assert registry.register(listener, Registration(ACC, 0, 0), None) is False
+
+
+def test_what_is_unregistered_while_it_is_restored_is_disabled_after_it(
+    registry: ListenerRegistry, service: Service
+) -> None:
+    listener = Listener()
+    registry.register(listener, Registration(GYRO, 0, 0), None)
+
+    def unregister(request: Any) -> bool:
+        registry.unregister(listener, None)
+        return False
+
+    returned = Daemon()
+    returned.refuses = unregister
+    service.state = ServiceState.DISCONNECTED
+    registry.restore(returned, {})  # type: ignore[arg-type]
+    assert returned.enabled == [(4, 0)]
+    returned.disabled.clear()
+    service.state = ServiceState.CONNECTED
+    (disable,) = service.posted
+    disable()
+    assert returned.disabled == [4]
+    assert service.callbacks == set()
+
+
+def test_what_is_registered_again_before_it_is_disabled_stays(
+    registry: ListenerRegistry, service: Service, daemon: Daemon
+) -> None:
+    listener = Listener()
+    for sensor in (GYRO, ACC):
+        registry.register(listener, Registration(sensor, 0, 0), None)
+    service.state = ServiceState.DISCONNECTED
+    registry.unregister(listener, GYRO)
+    assert registry.register(listener, Registration(GYRO, 0, 0), None)
+    (disable,) = service.posted
+    disable()
+    assert daemon.disabled == []
 
 
 def test_a_program_is_called_after_its_script(monkeypatch: pytest.MonkeyPatch) -> None:

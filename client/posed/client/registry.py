@@ -189,13 +189,17 @@ class ListenerRegistry:
             gone = [handle for handle in handles if queue.registrations.pop(handle, None) is not None]
             if not queue.registrations:
                 del queues[id(listener)]
-        if self._service.state is ServiceState.CONNECTED and gone:
+        if gone and self._service.state is ServiceState.CONNECTED:
             self._service.run(lambda: self._disable(queue, gone))
+        elif gone and self._service.state is not ServiceState.CLOSED:
+            # It may be being restored at this moment.
+            self._service.post(lambda: self._disable(queue, gone))
         return bool(gone)
 
     def _disable(self, queue: EventQueue, handles: Iterable[int]) -> None:
         for handle in handles:
-            self._disable_sensor(queue, handle)
+            if handle not in queue.registrations:  # nor asked for again since
+                self._disable_sensor(queue, handle)
         if not queue.registrations:
             self._remove_callback(queue.name)
 

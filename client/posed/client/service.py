@@ -112,9 +112,7 @@ class Service:
             if threading.current_thread() is self._thread:
                 return action()
             self.wait_connected(timeout_s)
-            future: Future[_T] = Future()
-            self._requests.append((action, future))
-            self._wake()
+            future = self.post(action)
             try:
                 return future.result(timeout_s)
             except TimeoutError:
@@ -122,6 +120,13 @@ class Service:
                 raise ServiceUnavailableError(f"the daemon did not answer within {timeout_s:g} s") from None
         except (DeadObjectError, TransactionTimeoutError) as error:
             raise ServiceUnavailableError(str(error)) from error
+
+    def post(self, action: Callable[[], _T]) -> "Future[_T]":
+        """Have `action` run on the service thread, once connected, without waiting for it."""
+        future: Future[_T] = Future()
+        self._requests.append((action, future))
+        self._wake()
+        return future
 
     def close(self) -> None:
         """Unbind and stop the thread; a second call does nothing. Takes a second at most, whatever the daemon does."""
