@@ -252,6 +252,9 @@ def test_dynamic_sensors_come_and_go(desk: Any, eventually: Eventually) -> None:
         desk.tell_phone("dynamic", True)
         eventually(lambda: len(manager.get_dynamic_sensor_list()) == 1)
         assert len(said) == 2
+        listener.has_enough.clear()
+        assert manager.register_listener(listener, clip_on, SENSOR_DELAY_GAME), "its registration went with it"
+        assert listener.has_enough.wait(10)
 
 
 def test_a_dynamic_sensor_callback_may_have_one_of_its_methods_only(desk: Any, eventually: Eventually) -> None:

@@ -1,6 +1,7 @@
 """Sensors that come and go while the phone runs (SystemSensorManager.updateDynamicSensorList)."""
 
 import threading
+from collections.abc import Callable
 
 from posed.binder.proxy import Proxy
 from posed.binder.stub import Caller, Stub
@@ -18,8 +19,9 @@ class DynamicSensors(Stub):
 
     descriptor = sensors_pb2.DESCRIPTOR.services_by_name["IDynamicSensorCallback"]
 
-    def __init__(self, service: Service) -> None:
+    def __init__(self, service: Service, on_gone: Callable[[int], None]) -> None:
         self._service = service
+        self._on_gone = on_gone
         self._sensor_service: Proxy | None = None
         self._boot_id = b""
         self._lock = threading.Lock()
@@ -61,9 +63,10 @@ class DynamicSensors(Stub):
 
     def _watch(self) -> None:
         if not self._is_watching:
+            self._service.connection.remove_callback(_NAME)  # of an earlier try
             self._service.connection.add_callback(_NAME, self)
-            self._is_watching = True
             self._ask()
+            self._is_watching = True
 
     def _ask(self) -> None:
         assert self._sensor_service is not None
@@ -71,7 +74,10 @@ class DynamicSensors(Stub):
         self._take_list(self._sensor_service.getDynamicSensorList(binder_pb2.Empty()))
 
     def _take_list(self, message: sensors_pb2.SensorList) -> None:
-        self._take({each.handle: Sensor.of_message(each) for each in message.sensors})
+        sensors = {each.handle: Sensor.of_message(each) for each in message.sensors}
+        for handle in self._sensors.keys() - sensors.keys():
+            self._on_gone(handle)
+        self._take(sensors)
 
     def _take(self, sensors: dict[int, Sensor]) -> None:
         before, self._sensors = self._sensors, sensors

@@ -124,6 +124,11 @@ class ListenerRegistry:
                     _log.error("sensor %d of %s is not registered any more: %s", handle, queue.name, error)
                     queue.registrations.pop(handle, None)
 
+    def drop(self, handle: int) -> None:
+        """Take a dynamic sensor that is gone from every listener: in the daemon it has ended already."""
+        self._drop(self._queues, handle)
+        self._drop(self._triggers, handle)
+
     # Private
 
     @property
@@ -202,6 +207,13 @@ class ListenerRegistry:
                 self._disable_sensor(queue, handle)
         if not queue.registrations:
             self._remove_callback(queue.name)
+
+    def _drop(self, queues: dict[int, _Queue], handle: int) -> None:
+        with self._lock:
+            for key, queue in list(queues.items()):
+                if queue.registrations.pop(handle, None) is not None and not queue.registrations:
+                    del queues[key]
+                    self._remove_callback(queue.name)
 
     def _fired(self, queue: TriggerEventQueue, handle: int) -> None:
         """End a request whose sensor has fired: in the daemon it has ended already."""

@@ -82,7 +82,7 @@ class SensorManager(SensorMaths):
             on_binding_died=on_binding_died,
         )
         self._registry = ListenerRegistry(self._service)
-        self._dynamic = DynamicSensors(self._service)
+        self._dynamic = DynamicSensors(self._service, self._registry.drop)
         self._service.start()
 
     def __enter__(self) -> "SensorManager":
