@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from posed.binder.status import ExceptionCode, RemoteError
+from posed.binder.status import ExceptionCode, RemoteError, TransactionTimeoutError
 from posed.client import Package, Sensor, SensorEvent, ServiceState
 from posed.client.event_queue import Registration
 from posed.client.registry import ListenerRegistry
@@ -20,6 +20,7 @@ class Daemon:
     def __init__(self) -> None:
         self.enabled: list[tuple[int, int]] = []
         self.disabled: list[int] = []
+        self.patience_s: float | None = None
         self.refuses: Callable[[Any], bool] = lambda request: False
 
     def enableSensor(self, request: Any) -> None:
@@ -27,8 +28,9 @@ class Daemon:
             raise RemoteError(ExceptionCode.ILLEGAL_ARGUMENT, "refused")
         self.enabled.append((request.handle, request.max_report_latency_us))
 
-    def disableSensor(self, request: Any) -> None:
+    def disableSensor(self, request: Any, timeout_s: float | None = None) -> None:
         self.disabled.append(request.handle)
+        self.patience_s = timeout_s
 
 
 class Service:
@@ -100,6 +102,23 @@ def test_a_daemon_that_returns_is_asked_for_all_of_it_again(registry: ListenerRe
     registry.restore(returned, {})  # type: ignore[arg-type]
     assert returned.enabled == [(1, 0)]
     assert registry.register(listener, Registration(ACC, 0, 0), None) is False
+
+
+def test_a_request_that_is_not_answered_is_taken_back_without_waiting(
+    registry: ListenerRegistry, service: Service, daemon: Daemon
+) -> None:
+    def hang(request: Any) -> bool:
+        raise TransactionTimeoutError("slow")
+
+    daemon.refuses = hang
+    listener = Listener()
+    with pytest.raises(TransactionTimeoutError):
+        registry.register(listener, Registration(GYRO, 0, 0), None)
+    assert daemon.disabled == [4]
+    assert daemon.patience_s == 0
+    assert service.callbacks == set()
+    daemon.refuses = lambda request: False
+    assert registry.register(listener, Registration(GYRO, 0, 0), None)
 
 
 def test_what_is_unregistered_while_it_is_restored_is_disabled_after_it(

@@ -3,11 +3,12 @@
 import logging
 import threading
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from itertools import count
 from typing import TypeVar
 
 from posed.binder.proxy import Proxy
-from posed.binder.status import RemoteError
+from posed.binder.status import RemoteError, TransactionTimeoutError
 from posed.client.binding import ServiceState
 from posed.client.event_queue import EventQueue, Registration, SensorEventQueue, TriggerEventQueue
 from posed.client.handler import Handler
@@ -154,11 +155,18 @@ class ListenerRegistry:
             self._enable_or_stream(queue, registration)
         except RemoteError as error:
             _log.error("cannot register %s: %s", sensor.name, error)
+            return False
+        except TransactionTimeoutError:
+            # The daemon may yet carry it out, and after it this one, which nobody waits for.
+            with suppress(TransactionTimeoutError):
+                self._disable_sensor(queue, sensor.handle, timeout_s=0.0)
+            raise
+        else:
+            queue.registrations[sensor.handle] = registration
+            return True
+        finally:
             if not queue.registrations:
                 self._remove_callback(queue.name)
-            return False
-        queue.registrations[sensor.handle] = registration
-        return True
 
     def _enable_or_stream(self, queue: EventQueue, registration: Registration) -> None:
         """Enable a sensor, without a latency if it fails with one (BaseEventQueue.addSensor)."""
@@ -181,9 +189,10 @@ class ListenerRegistry:
             )
         )
 
-    def _disable_sensor(self, queue: EventQueue, handle: int) -> None:
+    def _disable_sensor(self, queue: EventQueue, handle: int, timeout_s: float | None = None) -> None:
         """Undo `_enable`; a sensor that the daemon does not know of is no error."""
-        self._proxy.disableSensor(sensors_pb2.DisableSensorRequest(listener=queue.name, handle=handle))
+        request = sensors_pb2.DisableSensorRequest(listener=queue.name, handle=handle)
+        self._proxy.disableSensor(request, timeout_s=timeout_s)
 
     def _remove(self, queues: dict[int, _Queue], listener: object, sensor: Sensor | None) -> bool:
         with self._lock:
