@@ -3,7 +3,6 @@
 import itertools
 import logging
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -118,6 +117,17 @@ def _dynamic(handle: int) -> SensorInfo:
     )
 
 
+def _with_a_dynamic_sensor(make_bench: MakeBench) -> tuple[Any, SensorEventConnection]:
+    """Return a bench 20 ms on and a listener of its gyroscope and of the sensor that came."""
+    bench = make_bench((GYRO,))
+    listener = bench.service.connect()
+    bench.service.enable(listener, GYRO, 20_000, 0)
+    bench.source.connected = (_dynamic(1000),)
+    bench.advance_ms(20)
+    bench.service.enable(listener, 1000, 20_000, 0)
+    return bench, listener
+
+
 def test_a_dynamic_sensor_comes_serves_and_goes(make_bench: MakeBench) -> None:
     bench = make_bench((GYRO,))
     listener = bench.service.connect()
@@ -136,12 +146,7 @@ def test_a_dynamic_sensor_comes_serves_and_goes(make_bench: MakeBench) -> None:
 
 
 def test_a_lost_source_takes_its_dynamic_sensors_along(make_bench: MakeBench) -> None:
-    bench = make_bench((GYRO,))
-    listener = bench.service.connect()
-    bench.service.enable(listener, GYRO, 20_000, 0)
-    bench.source.connected = (replace(_dynamic(1000)),)
-    bench.advance_ms(20)
-    bench.service.enable(listener, 1000, 20_000, 0)
+    bench, _ = _with_a_dynamic_sensor(make_bench)
     bench.source.lose()
     bench.advance_ms(40)
     assert bench.service.dynamic_sensors == ()
@@ -172,12 +177,7 @@ def test_a_sensor_that_the_source_refuses_leaves_no_trace(
 
 
 def test_a_flush_of_a_dynamic_sensor_that_went_is_forgotten_with_it(make_bench: MakeBench) -> None:
-    bench = make_bench((GYRO,))
-    listener = bench.service.connect()
-    bench.service.enable(listener, GYRO, 20_000, 0)
-    bench.source.connected = (_dynamic(1000),)
-    bench.advance_ms(20)
-    bench.service.enable(listener, 1000, 20_000, 0)
+    bench, listener = _with_a_dynamic_sensor(make_bench)
     bench.source.flush_is_slow = True
     bench.service.flush(listener)
     bench.source.disconnected = (1000,)
@@ -206,12 +206,7 @@ def test_what_a_returned_source_makes_of_a_period_is_taken_over(make_bench: Make
 
 
 def test_events_of_a_dynamic_sensor_that_went_are_nobodys(make_bench: MakeBench) -> None:
-    bench = make_bench((GYRO,))
-    listener = bench.service.connect()
-    bench.service.enable(listener, GYRO, 20_000, 0)
-    bench.source.connected = (_dynamic(1000),)
-    bench.advance_ms(20)
-    bench.service.enable(listener, 1000, 20_000, 0)
+    bench, listener = _with_a_dynamic_sensor(make_bench)
     bench.source.disconnected = (1000,)
     bench.advance_ms(40)
     assert 1000 in bench.source._done_ns
